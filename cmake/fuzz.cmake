@@ -1,0 +1,31 @@
+# fuzz/<name>_fuzz.cpp: with TELLURION_FUZZ a libFuzzer program fuzz_<name>; otherwise a test that replays
+# fuzz/corpus/<name>/ through it. A line `// rooms: raster source` among a fuzzer's first ten says what it links
+# (tellurion::globe without one).
+
+file(GLOB fuzz_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/fuzz/*_fuzz.cpp)
+foreach(source IN LISTS fuzz_sources)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${source})
+  cmake_path(GET source STEM stem)
+  string(REGEX REPLACE "_fuzz$" "" name ${stem})
+  file(STRINGS ${source} rooms_line REGEX "^// rooms:" LIMIT_COUNT 1)
+  if(rooms_line)
+    string(REGEX REPLACE "^// rooms: *" "" rooms "${rooms_line}")
+    string(REGEX MATCHALL "[a-z]+" rooms "${rooms}")
+  else()
+    set(rooms globe)
+  endif()
+  list(TRANSFORM rooms PREPEND tellurion::)
+
+  if(TELLURION_FUZZ)
+    add_executable(fuzz_${name} ${source})
+    target_compile_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+  else()
+    add_executable(fuzz_${name} ${source} ${PROJECT_SOURCE_DIR}/fuzz/replay_main.cpp)
+    add_test(NAME fuzz_${name} COMMAND fuzz_${name} ${PROJECT_SOURCE_DIR}/fuzz/corpus/${name})
+    set_tests_properties(fuzz_${name} PROPERTIES LABELS "quick;fuzz" TIMEOUT 120)
+  endif()
+  tellurion_use_warnings(fuzz_${name})
+  target_link_libraries(fuzz_${name} PRIVATE ${rooms})
+  set_target_properties(fuzz_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/fuzz)
+endforeach()

@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that Tellurion needs: the one place where packages are installed.
+# Does nothing, quickly, when everything is there.
+set -euo pipefail
+
+usage() {
+  cat <<'USAGE'
+usage: tools/setup.sh [--test] [--fuzz] [--dry-run]
+
+Installs what is missing of the Debian 12 packages to build and run Tellurion.
+  --test      also what the tests need (doctest, GeographicLib, Python, Xvfb, ...)
+  --fuzz      also what the fuzzers need (clang with libFuzzer)
+  --dry-run   only name the missing packages
+USAGE
+}
+
+build_packages=(
+  g++ cmake ninja-build ccache mold pkg-config git
+  libegl-dev libepoxy-dev libgl-dev libgles-dev libopengl-dev  # OpenGL headers and loader
+  libegl-mesa0 libgl1-mesa-dri                                 # a driver that needs no GPU and no display
+  libglfw3-dev libimgui-dev libstb-dev                         # the window
+  libcli11-dev libfmt-dev libglm-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
+  gdal-bin libgdal-dev libproj-dev proj-bin proj-data
+  ffmpeg                                                       # writes the video of a flight
+)
+test_packages=(
+  doctest-dev libgeographiclib-dev
+  python3 python3-gdal python3-numpy
+  imagemagick x11-apps xauth xdotool xvfb
+)
+fuzz_packages=(clang libclang-rt-14-dev)
+
+packages=("${build_packages[@]}")
+dry_run=false
+while (($#)); do
+  case $1 in
+    --test) packages+=("${test_packages[@]}") ;;
+    --fuzz) packages+=("${fuzz_packages[@]}") ;;
+    --dry-run) dry_run=true ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; exit 2 ;;
+  esac
+  shift
+done
+
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  echo "tools/setup.sh: this is not a Debian system; install by hand: ${packages[*]}" >&2
+  exit 1
+fi
+
+# The packages whose state is "installed", one name a line (without the architecture).
+installed=$(dpkg-query --show --showformat '${db:Status-Status} ${binary:Package}\n' | sed -n 's/^installed //p' | sed 's/:.*//')
+missing=()
+for package in "${packages[@]}"; do
+  grep -qxF -- "$package" <<<"$installed" || missing+=("$package")
+done
+((${#missing[@]})) || exit 0
+
+if $dry_run; then
+  printf '%s\n' "${missing[@]}"
+  exit 0
+fi
+
+as_root=()
+if (($(id -u) != 0)); then
+  if ! command -v sudo >/dev/null; then
+    echo "tools/setup.sh: neither root nor sudo; ask for: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+echo "tools/setup.sh: installing ${missing[*]}" >&2
+# Output goes to standard error: the caller's standard output stays its own.
+"${as_root[@]}" apt-get update -q >&2
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >&2
