@@ -85,6 +85,11 @@ endforeach()
 # Files whose names begin with _ are helpers. Among a script's first five lines `# label: slow` and `# timeout: N` count.
 # Exit status 77 means skipped.
 
+set(script_environment "TELLURION=$<TARGET_FILE:tellurion>" "TELLURION_SHARED_DATA_DIR=${shared_data}"
+  "TELLURION_TEST_DATA_DIR=${PROJECT_SOURCE_DIR}/tests/data" PYTHONDONTWRITEBYTECODE=1)
+if(TELLURION_SANITIZE MATCHES "address")
+  list(APPEND script_environment ASAN_OPTIONS=detect_leaks=0)  # the program does not keep the OpenGL driver loaded
+endif()
 if(TARGET tellurion)
   foreach(kind e2e golden)
     file(GLOB scripts CONFIGURE_DEPENDS
@@ -113,7 +118,7 @@ if(TARGET tellurion)
       add_test(NAME ${kind}_${stem} COMMAND ${command} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
       set_tests_properties(${kind}_${stem} PROPERTIES
         LABELS "${labels};${kind}" TIMEOUT ${timeout} SKIP_RETURN_CODE 77
-        ENVIRONMENT "TELLURION=$<TARGET_FILE:tellurion>;TELLURION_SHARED_DATA_DIR=${shared_data};TELLURION_TEST_DATA_DIR=${PROJECT_SOURCE_DIR}/tests/data;PYTHONDONTWRITEBYTECODE=1")
+        ENVIRONMENT "${script_environment}")
     endforeach()
   endforeach()
 endif()

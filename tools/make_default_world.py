@@ -106,12 +106,13 @@ def write_elevation(original, out):
 
 
 def write_image(original, out, name, *, bands, options):
-    colors = ["gray"] if len(bands) == 1 else ["red", "green", "blue"]
-    bare = gdal.Translate("", original, format="MEM", bandList=bands, colorInterpretation=colors,
+    bare = gdal.Translate("", original, format="MEM", bandList=bands,
                           outputSRS="EPSG:4326", outputBounds=(-180, 90, 180, -90))
     # Metadata of the pictures (EXIF) says nothing about the world: left behind.
     for domain in bare.GetMetadataDomainList() or []:
         bare.SetMetadata({}, domain)
+    if len(bands) == 1:
+        bare.GetRasterBand(1).SetColorInterpretation(gdal.GCI_GrayIndex)
     gdal.Translate(str(out / name), bare, format="COG", creationOptions=COG + options)
 
 

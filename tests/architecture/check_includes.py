@@ -13,7 +13,7 @@ import re
 import sys
 import tempfile
 
-INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)', re.MULTILINE)
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"([^"]+)"|<([^>]+)>)', re.MULTILINE)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SOURCE_SUFFIXES = {".h", ".cpp"}
 # Where a header may be used from, so as not to be an orphan.
@@ -41,8 +41,7 @@ class Rules:
 def includes_of(file):
     text = COMMENT.sub(lambda match: "\n" * match.group().count("\n"), file.read_text(encoding="utf-8"))
     for match in INCLUDE.finditer(text):
-        line = text.count("\n", 0, match.start(0) + len(match.group(0)) - len(match.group(0).lstrip())) + 1
-        yield line, match.group(1) or match.group(2), match.group(1) is not None
+        yield text.count("\n", 0, match.start()) + 1, match.group(1) or match.group(2), match.group(1) is not None
 
 
 def sources(root, folder):
