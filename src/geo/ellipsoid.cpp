@@ -16,18 +16,18 @@ Radians longitude_of(double x, double y) {
   return Radians(longitude == -std::numbers::pi ? std::numbers::pi : longitude);
 }
 
-/// The point of the meridian ellipse whose normal goes through the position, times an unknown factor:
-/// (cos, sin) of the latitude are proportional to (equatorial, axial).
+/// The ellipsoid's normal through a position, in its meridian's plane: proportional to (cos, sin) of the latitude.
 struct NormalDirection {
   double equatorial;
   double axial;
 };
 
-/// Vermeille (2011). `rho` is the distance from the axis. Requires (rho, z) != (0, 0).
-NormalDirection normal_direction(const Ellipsoid& ellipsoid, double rho, double z) {
-  const double e2 = ellipsoid.e2();
-  const double sqrt_p = rho / ellipsoid.a();
-  const double sqrt_q = std::sqrt(1.0 - e2) * std::abs(z) / ellipsoid.a();
+/// Vermeille (2011), with his names. `rho` is the distance from the axis. Requires (rho, z) != (0, 0).
+NormalDirection normal_direction(const Ellipsoid& ellipsoid, double e2, double rho, double z) {
+  if (e2 == 0.0) return {rho, z};
+  const double inverse_a = 1.0 / ellipsoid.a();
+  const double sqrt_p = rho * inverse_a;
+  const double sqrt_q = std::abs(z) * ellipsoid.b() * inverse_a * inverse_a;
   const double p = sqrt_p * sqrt_p;
   const double q = sqrt_q * sqrt_q;
   const double r = (p + q - e2 * e2) / 6.0;
@@ -55,7 +55,7 @@ NormalDirection normal_direction(const Ellipsoid& ellipsoid, double rho, double 
   const double v = std::sqrt(u * u + e2 * e2 * q);
   const double w = e2 * (u + v - q) / (2.0 * v);
   const double k = (u + v) / (std::sqrt(w * w + u + v) + w);
-  return {k * rho / (k + e2), z};
+  return {k * rho, (k + e2) * z};
 }
 
 /// Distance along a ray to the ellipsoid with half axes `a`, `b`; -1 if there is none.
@@ -110,25 +110,28 @@ Geodetic to_geodetic(const Ellipsoid& ellipsoid, const Point<Ecef>& position) {
   if (rho == 0.0 && p.z == 0.0) {
     return {Radians(std::numbers::pi / 2.0), Radians(0.0), EllipsoidalHeight(-ellipsoid.b())};
   }
-  const NormalDirection n = normal_direction(ellipsoid, rho, p.z);
-  const double length = std::sqrt(n.equatorial * n.equatorial + n.axial * n.axial);
-  const double cos_lat = n.equatorial / length;
-  const double sin_lat = n.axial / length;
+  const double e2 = ellipsoid.e2();
+  const NormalDirection n = normal_direction(ellipsoid, e2, rho, p.z);
+  const double scale = 1.0 / std::sqrt(n.equatorial * n.equatorial + n.axial * n.axial);
+  const double cos_lat = n.equatorial * scale;
+  const double sin_lat = n.axial * scale;
   // Distance from the tangent plane: an error of the latitude changes it only in the second order.
-  const double height =
-      rho * cos_lat + p.z * sin_lat - ellipsoid.a() * std::sqrt(1.0 - ellipsoid.e2() * sin_lat * sin_lat);
+  const double height = rho * cos_lat + p.z * sin_lat - ellipsoid.a() * std::sqrt(1.0 - e2 * sin_lat * sin_lat);
   return {Radians(std::atan2(n.axial, n.equatorial)), longitude_of(p.x, p.y), EllipsoidalHeight(height)};
 }
 
+glm::dmat3 enu_axes(const LatLon& place) {
+  const double sin_lat = std::sin(place.latitude.value);
+  const double cos_lat = std::cos(place.latitude.value);
+  const double sin_lon = std::sin(place.longitude.value);
+  const double cos_lon = std::cos(place.longitude.value);
+  return {{-sin_lon, cos_lon, 0.0},
+          {-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat},
+          {cos_lat * cos_lon, cos_lat * sin_lon, sin_lat}};
+}
+
 Transform<Ecef, Enu> enu_at(const Ellipsoid& ellipsoid, const Geodetic& origin) {
-  const double sin_lat = std::sin(origin.latitude.value);
-  const double cos_lat = std::cos(origin.latitude.value);
-  const double sin_lon = std::sin(origin.longitude.value);
-  const double cos_lon = std::cos(origin.longitude.value);
-  const glm::dvec3 east(-sin_lon, cos_lon, 0.0);
-  const glm::dvec3 north(-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat);
-  const glm::dvec3 up(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
-  return {glm::dmat3(east, north, up), to_ecef(ellipsoid, origin).xyz};
+  return {enu_axes(place_of(origin)), to_ecef(ellipsoid, origin).xyz};
 }
 
 double intersect_ray(const Ellipsoid& ellipsoid, Metres height, const Point<Ecef>& eye, const Vector<Ecef>& direction) {

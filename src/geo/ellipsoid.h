@@ -42,6 +42,9 @@ Point<Ecef> to_ecef(const Ellipsoid& ellipsoid, const Geodetic& place);
 /// Inside it, the nearest surface point's angles with the longest downward normal; at the centre: lat 90, lon 0.
 Geodetic to_geodetic(const Ellipsoid& ellipsoid, const Point<Ecef>& position);
 
+/// East, north and up at `place` as columns, unit vectors in ECEF. At a pole, east is that of the given longitude.
+glm::dmat3 enu_axes(const LatLon& place);
+
 /// East, north and up at `origin`, as a rigid motion to ECEF. At a pole, east is that of the given longitude.
 Transform<Ecef, Enu> enu_at(const Ellipsoid& ellipsoid, const Geodetic& origin);
 

@@ -134,7 +134,8 @@ TileKey neighbour(const TileKey& key, Side side) {
   const double half = std::ldexp(1.0, key.level);
   const FaceAxes& from = kFaces[key.face];
   const glm::dvec3 outward = from.right * step.x + from.down * step.y;
-  const glm::dvec3 along = step.x != 0.0 ? from.down * (2.0 * key.y + 1.0 - half) : from.right * (2.0 * key.x + 1.0 - half);
+  const glm::dvec3 along =
+      step.x != 0.0 ? from.down * (2.0 * key.y + 1.0 - half) : from.right * (2.0 * key.x + 1.0 - half);
   const glm::dvec3 middle = outward * half + from.out * (half - 1.0) + along;
   beside.face = face_towards(outward);
   const FaceAxes& to = kFaces[beside.face];

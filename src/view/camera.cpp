@@ -6,6 +6,7 @@
 #include <string>
 
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include "base/number.h"
 
@@ -18,8 +19,9 @@ constexpr double kFarthestHeight = 1e12;  // metres; the Sun is at 1.5e11
 
 Result<Pose> parse_pose(std::string_view text) {
   const auto fail = [&](const std::string& why) {
-    return Error{ErrorCode::invalid_argument, "camera '" + std::string(text.substr(0, 120)) + "': " + why +
-                                                  " (wanted: lat,lon,height[,heading[,pitch[,roll]]] in degrees and metres)"};
+    return Error{ErrorCode::invalid_argument,
+                 "camera '" + std::string(text.substr(0, 120)) + "': " + why +
+                     " (wanted: lat,lon,height[,heading[,pitch[,roll]]] in degrees and metres)"};
   };
   constexpr std::array<const char*, 6> kNames{"lat", "lon", "height", "heading", "pitch", "roll"};
   std::array<double, 6> numbers{0.0, 0.0, 0.0, 0.0, -90.0, 0.0};
@@ -48,8 +50,7 @@ geo::Vector<geo::Ecef> Camera::ray(glm::dvec2 pixel) const {
   return {glm::normalize(axes[0] * offset.x - axes[1] * offset.y - axes[2])};
 }
 
-Camera make_camera(const geo::Ellipsoid& ellipsoid, const Pose& pose, Radians vertical_fov, int width, int height) {
-  const geo::Transform<geo::Ecef, geo::Enu> enu = geo::enu_at(ellipsoid, pose.position);
+glm::dmat3 axes_of(const Pose& pose) {
   const double sin_heading = std::sin(pose.heading.value), cos_heading = std::cos(pose.heading.value);
   const double sin_pitch = std::sin(pose.pitch.value), cos_pitch = std::cos(pose.pitch.value);
   const double sin_roll = std::sin(pose.roll.value), cos_roll = std::cos(pose.roll.value);
@@ -58,21 +59,28 @@ Camera make_camera(const geo::Ellipsoid& ellipsoid, const Pose& pose, Radians ve
   const glm::dvec3 level_up = glm::cross(level_right, forward);
   const glm::dmat3 axes(level_right * cos_roll - level_up * sin_roll, level_up * cos_roll + level_right * sin_roll,
                         -forward);
-  return {{enu.translation}, enu.rotation * axes, vertical_fov, width, height};
+  return geo::enu_axes(geo::place_of(pose.position)) * axes;
 }
 
-Pose pose_of(const geo::Ellipsoid& ellipsoid, const Camera& camera) {
-  const geo::Geodetic position = geo::to_geodetic(ellipsoid, camera.eye);
-  const glm::dmat3 axes = geo::enu_at(ellipsoid, position).inverse().rotation * camera.axes;
-  const glm::dvec3& right = axes[0];
-  const glm::dvec3 forward = -axes[2];
+Pose pose_with_axes(const geo::Geodetic& position, const glm::dmat3& axes) {
+  const glm::dmat3 local = glm::transpose(geo::enu_axes(geo::place_of(position))) * axes;
+  const glm::dvec3& right = local[0];
+  const glm::dvec3 forward = -local[2];
   const double level = std::hypot(forward.x, forward.y);
   const Radians pitch(std::atan2(forward.z, level));
   // Straight up or down, heading and roll turn about the same axis: all of it is heading.
   if (level < 1e-12) return {position, Radians(std::atan2(-right.y, right.x)), pitch, Radians(0.0)};
   const glm::dvec3 level_right = glm::dvec3(forward.y, -forward.x, 0.0) / level;
   return {position, Radians(std::atan2(forward.x, forward.y)), pitch,
-          Radians(std::atan2(glm::dot(axes[1], level_right), glm::dot(right, level_right)))};
+          Radians(std::atan2(glm::dot(local[1], level_right), glm::dot(right, level_right)))};
+}
+
+Camera make_camera(const geo::Ellipsoid& ellipsoid, const Pose& pose, Radians vertical_fov, int width, int height) {
+  return {geo::to_ecef(ellipsoid, pose.position), axes_of(pose), vertical_fov, width, height};
+}
+
+Pose pose_of(const geo::Ellipsoid& ellipsoid, const Camera& camera) {
+  return pose_with_axes(geo::to_geodetic(ellipsoid, camera.eye), camera.axes);
 }
 
 Frustum make_frustum(const Camera& camera) {

@@ -40,6 +40,11 @@ struct Camera {
   geo::Vector<geo::Ecef> ray(glm::dvec2 pixel) const;
 };
 
+/// The camera axes of `pose` in ECEF (see Camera::axes); heights and ellipsoids do not matter.
+glm::dmat3 axes_of(const Pose& pose);
+/// The pose of a camera with these axes in this place.
+Pose pose_with_axes(const geo::Geodetic& position, const glm::dmat3& axes);
+
 Camera make_camera(const geo::Ellipsoid& ellipsoid, const Pose& pose, Radians vertical_fov, int width, int height);
 /// The reverse of make_camera. At a pole, heading counts from the meridian of the position's longitude.
 Pose pose_of(const geo::Ellipsoid& ellipsoid, const Camera& camera);
