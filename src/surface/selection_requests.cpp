@@ -1,0 +1,80 @@
+#include "surface/selection_requests.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace tellurion::surface {
+namespace {
+
+constexpr int kLevelsBetweenSteps = 3;
+
+}  // namespace
+
+void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& requests, SelectionStats& stats) {
+  requests_.clear();
+  stats.tiles_waiting = 0;
+  stats.selected_by_level.clear();
+  for (Node& root : pool_.roots()) collect(frame, root, nullptr, stats);
+  const auto order = [](const TileRequest& a, const TileRequest& b) {
+    return std::tie(b.gain_px, a.key, a.part) < std::tie(a.gain_px, b.key, b.part);
+  };
+  const std::size_t count = std::min(requests_.size(), kMostRequests);
+  const auto end = requests_.begin() + static_cast<std::ptrdiff_t>(count);
+  std::ranges::partial_sort(requests_, end, order);
+  requests.assign(requests_.begin(), end);
+}
+
+void RequestList::want(const SelectionFrame& frame, Node& node, Part part, double gain_px) {
+  NodePart& wanted = node.part(part);
+  wanted.wanted = frame.number;
+  if (!can_request(wanted.life, frame.now)) return;
+  const std::size_t p = index_of(part);
+  if (node.requested[p] == frame.number) {
+    double& gain = requests_[node.request_index[p]].gain_px;
+    gain = std::max(gain, gain_px);
+    return;
+  }
+  node.requested[p] = frame.number;
+  node.request_index[p] = static_cast<std::uint32_t>(requests_.size());
+  requests_.push_back({node.key, part, std::max(gain_px, 0.0)});
+}
+
+/// Asks for the slot of the node's colour owner; true if it is resident already.
+bool RequestList::want_colour(const SelectionFrame& frame, Node& node) {
+  Node& owner = *node.colour_owner;
+  if (owner.resident(Part::colour) != nullptr) return true;
+  const Node& shown = *node.colour_shown;  // a slot that is not there shows one colour for all of its tile
+  const double texel = shown.resident(Part::colour) != nullptr ? texel_metres(shown.shape) : shown.shape.size;
+  const double lost = texel - texel_metres(owner.shape);
+  want(frame, owner, Part::colour, to_pixels(frame.errors, lost, node.distance) * node.texel_share);
+  return false;
+}
+
+void RequestList::collect(const SelectionFrame& frame, Node& node, const Node* shown, SelectionStats& stats) {
+  if (!node.visible) return;
+  if (node.drawn == frame.number) shown = &node;
+  const bool has_geometry = node.resident(Part::geometry) != nullptr;
+  // Errors of a stand-in are taken where the node is. Without one, finer tiles are drawn: nothing is lost by waiting.
+  const double shown_px = shown != nullptr ? to_pixels(frame.errors, shown->error_m, node.distance) : 0;
+  if (node.split) {
+    const bool is_step = shown != nullptr && (node.key.level - shown->key.level) % kLevelsBetweenSteps == 0;
+    if (is_step && !has_geometry) want(frame, node, Part::geometry, shown_px);
+    if (is_step) want_colour(frame, node);
+    for (int i = 0; i < 4; ++i) collect(frame, node.children[i], shown, stats);
+    return;
+  }
+
+  const std::size_t level = node.key.level;
+  if (stats.selected_by_level.size() <= level) stats.selected_by_level.resize(level + 1, 0);
+  ++stats.selected_by_level[level];
+
+  if (!has_geometry) want(frame, node, Part::geometry, shown_px - node.geometry_px);
+  Node& slopes = *node.slope_owner;
+  const bool has_slopes = slopes.resident(Part::geometry) != nullptr;
+  if (!has_slopes && &slopes != &node) want(frame, slopes, Part::geometry, shown_px - node.geometry_px);
+
+  const bool has_colour = want_colour(frame, node);
+  if (!has_geometry || !has_slopes || !has_colour) ++stats.tiles_waiting;
+}
+
+}  // namespace tellurion::surface

@@ -1,0 +1,144 @@
+#include "surface/selection_wanted.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tellurion::surface {
+namespace {
+
+constexpr double kErrorStep = 1.25;
+constexpr int kMostErrorSteps = 100;
+/// A pass that selects so many times the allowed tiles is broken off: it cannot fit.
+constexpr std::size_t kHopelessFactor = 4;
+/// The metrics that ignore errors stop where the error is below this share of the wanted one: the data have no more to show.
+constexpr double kNothingToGain = 1.0 / 16;
+
+struct HeightRange {
+  double lowest = 0;
+  double highest = 0;
+};
+
+/// Bounds of the displayed heights. Where facts give no error a tile is judged once it is resident, and then by its own
+/// range; cut to the facts' range, so that what was culled before it arrived is culled after.
+HeightRange heights_of(const Node& node, double exaggeration) {
+  double lowest = node.facts.min_height;
+  double highest = node.facts.max_height;
+  if (const Resident* geometry = node.resident(Part::geometry); geometry != nullptr && !node.facts.height_error) {
+    lowest = std::clamp<double>(geometry->metrics.min_height, lowest, highest);
+    highest = std::clamp<double>(geometry->metrics.max_height, lowest, highest);
+  }
+  return {lowest * exaggeration, highest * exaggeration};
+}
+
+void inherit_owners(Node& node) {
+  Node* const parent = node.parent;
+  const bool has_colour = node.resident(Part::colour) != nullptr;
+  node.colour_owner = node.facts.own_colour ? &node : parent->colour_owner;
+  node.colour_shown = parent == nullptr || (node.facts.own_colour && has_colour) ? &node : parent->colour_shown;
+
+  // An owner that turned out to hold no slopes passes the question on.
+  const Resident* geometry = node.resident(Part::geometry);
+  const bool owns_slopes = node.facts.own_slopes && (geometry == nullptr || geometry->has_slopes);
+  const bool has_slopes = owns_slopes && geometry != nullptr;
+  node.slope_owner = parent == nullptr || owns_slopes ? &node : parent->slope_owner;
+  node.slope_shown = parent == nullptr || has_slopes ? &node : parent->slope_shown;
+}
+
+}  // namespace
+
+SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
+                          FrameNumber number, TimePoint now) {
+  double lowest = 0;
+  for (const Node& root : pool.roots()) lowest = std::min<double>(lowest, root.facts.min_height);
+  const ErrorView errors{camera.eye.xyz, camera.pixel_angle(), settings.exaggeration, settings.anisotropy,
+                         pool.ellipsoid().a()};
+  return {number, now, settings, errors, make_view_volume(camera),
+          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest * settings.exaggeration)};
+}
+
+void WantedCut::see(const SelectionFrame& frame, Node& node) const {
+  if (node.seen == frame.number) return;
+  node.seen = frame.number;
+  node.split = false;
+  const HeightRange heights = heights_of(node, frame.settings.exaggeration);
+  if (heights.lowest != node.box_lowest || heights.highest != node.box_highest) {
+    node.box = tile_box(pool_.ellipsoid(), node.key, heights.lowest, heights.highest);
+    node.box_lowest = heights.lowest;
+    node.box_highest = heights.highest;
+  }
+  const auto planes = planes_crossed(frame.volume, node.box, node.is_root() ? kAllPlanes : node.parent->planes);
+  node.visible = planes.has_value() && !frame.horizon.hides(node.box);
+  if (!node.visible) return;
+  node.planes = *planes;
+  inherit_owners(node);
+
+  const Resident* geometry = node.resident(Part::geometry);
+  node.error_known = node.facts.height_error.has_value() || geometry != nullptr;
+  node.error_m = 0;
+  if (node.facts.height_error) {
+    node.error_m = error_metres(frame.errors, *node.facts.height_error, node.full_grid_error, node.facts.max_height);
+  }
+  if (geometry != nullptr) {
+    const TileMetrics& built = geometry->metrics;
+    node.error_m = std::max(
+        node.error_m, error_metres(frame.errors, built.height_error, built.curvature_error, built.max_height));
+  }
+  node.distance = distance_to(node.box, frame.errors.eye);
+  node.geometry_px = to_pixels(frame.errors, std::max(node.error_m, precision_metres(node.shape)), node.distance);
+  node.texel_share = visible_share(frame.errors, node.shape, node.box, heights.highest - heights.lowest);
+  node.error_px = node.geometry_px;
+  if (node.facts.finer_colour_below) {
+    const double texel_px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share;
+    node.error_px = std::max(node.error_px, texel_px);
+  }
+}
+
+bool WantedCut::wants_split(const SelectionFrame& frame, const Node& node) const {
+  if (node.key.level == geo::kMaxTileLevel || !node.error_known) return false;
+  const bool has_more = node.error_px > kNothingToGain * effective_sse_px_;
+  const double distance = std::max(node.distance, kNearestDistance);
+  switch (frame.settings.metric) {
+    case LodMetric::screen_space_error:
+      return node.error_px > effective_sse_px_;
+    case LodMetric::distance:
+      return has_more && distance < split_distance_ * node.shape.size;
+    case LodMetric::solid_angle:
+      return has_more && node.shape.size * node.shape.size * node.texel_share > split_solid_angle_ * distance * distance;
+  }
+  return false;
+}
+
+void WantedCut::refine(const SelectionFrame& frame, Node& node) {
+  ++visited_;
+  see(frame, node);
+  if (!node.visible) return;
+  node.split = wants_split(frame, node);
+  if (!node.split) {
+    ++selected_;
+  } else if (static_cast<std::size_t>(selected_) <= kHopelessFactor * frame.settings.max_tiles) {
+    pool_.add_children(node);
+    for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);
+  }
+  for (UseOrder& order : orders_) order.touch(node, frame.number);  // after the children: see UseOrder
+}
+
+bool WantedCut::fits(const SelectionFrame& frame, int steps) {
+  visited_ = selected_ = 0;
+  effective_sse_px_ = frame.settings.sse_px * std::pow(kErrorStep, steps);
+  split_distance_ = split_distance_in_sizes(frame.errors, effective_sse_px_);
+  split_solid_angle_ = split_solid_angle(frame.errors, effective_sse_px_);
+  for (Node& root : pool_.roots()) refine(frame, root);
+  return static_cast<std::size_t>(selected_) <= frame.settings.max_tiles;
+}
+
+void WantedCut::find(const SelectionFrame& frame) {
+  if (!fits(frame, steps_)) {
+    while (steps_ < kMostErrorSteps && !fits(frame, ++steps_)) {}
+    return;
+  }
+  if (steps_ == 0) return;
+  while (steps_ > 0 && fits(frame, steps_ - 1)) --steps_;
+  if (steps_ > 0) fits(frame, steps_);  // the last trial marked the nodes for a cut that does not fit
+}
+
+}  // namespace tellurion::surface
