@@ -1,0 +1,134 @@
+#include "cache/block_cache.h"
+
+#include <condition_variable>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <variant>
+
+namespace tellurion::cache {
+namespace {
+
+using Block = std::variant<Frozen<raster::HeightGrid>, Frozen<raster::Image>>;
+
+/// Heights and colours of one source are different blocks.
+struct Name {
+  BlockKey key;
+  bool is_image = false;
+
+  friend bool operator==(const Name&, const Name&) = default;
+};
+
+struct NameHash {
+  std::size_t operator()(const Name& n) const noexcept {
+    std::uint64_t h = (std::uint64_t{n.key.source} << 33) ^ (std::uint64_t{n.key.level} << 1) ^ std::uint64_t{n.is_image};
+    h ^= (std::uint64_t{static_cast<std::uint32_t>(n.key.column)} << 32 | static_cast<std::uint32_t>(n.key.row)) *
+         0x9e3779b97f4a7c15ull;
+    h ^= h >> 32;
+    h *= 0xd6e8feb86659fd93ull;
+    return static_cast<std::size_t>(h ^ (h >> 32));
+  }
+};
+
+struct Entry {
+  Name name;
+  Block block;
+  std::size_t bytes = 0;
+};
+
+/// A decoding under way: the first thread decodes, the others wait for `outcome`.
+struct Flight {
+  std::optional<Result<Block>> outcome;
+};
+
+}  // namespace
+
+struct BlockCache::State {
+  explicit State(std::size_t budget) : budget_bytes(budget) {}
+
+  template <class Data, class Decode>
+  Result<Frozen<Data>> find_or_decode(const Name& name, const Decode& decode);
+  void keep(const Name& name, const Block& block, std::size_t block_bytes);
+
+  const std::size_t budget_bytes;
+  mutable std::mutex mutex;
+  std::condition_variable landed;
+  std::size_t bytes = 0;
+  std::list<Entry> entries;  ///< the most recently used first
+  std::unordered_map<Name, std::list<Entry>::iterator, NameHash> index;
+  std::unordered_map<Name, std::shared_ptr<Flight>, NameHash> flights;
+};
+
+template <class Data, class Decode>
+Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const Decode& decode) {
+  const auto typed = [](const Result<Block>& outcome) -> Result<Frozen<Data>> {
+    if (!outcome) return outcome.error();
+    return std::get<Frozen<Data>>(outcome.value());
+  };
+
+  std::unique_lock lock(mutex);
+  if (const auto found = index.find(name); found != index.end()) {
+    entries.splice(entries.begin(), entries, found->second);
+    return std::get<Frozen<Data>>(found->second->block);
+  }
+  if (const auto flying = flights.find(name); flying != flights.end()) {
+    const std::shared_ptr<Flight> flight = flying->second;
+    landed.wait(lock, [&] { return flight->outcome.has_value(); });
+    return typed(*flight->outcome);
+  }
+  const auto flight = std::make_shared<Flight>();
+  flights.emplace(name, flight);
+  lock.unlock();
+
+  Result<Data> decoded = decode();
+  Result<Block> outcome = decoded ? Result<Block>(Block(freeze(std::move(decoded).value()))) : Result<Block>(decoded.error());
+
+  lock.lock();
+  flight->outcome = std::move(outcome);
+  flights.erase(name);
+  if (flight->outcome->has_value()) {
+    const Block& block = flight->outcome->value();
+    keep(name, block, sizeof(Entry) + std::get<Frozen<Data>>(block)->bytes());
+  }
+  lock.unlock();
+  landed.notify_all();
+  return typed(*flight->outcome);
+}
+
+void BlockCache::State::keep(const Name& name, const Block& block, std::size_t block_bytes) {
+  while (!entries.empty() && bytes > budget_bytes) {
+    bytes -= entries.back().bytes;
+    index.erase(entries.back().name);
+    entries.pop_back();
+  }
+  entries.push_front(Entry{name, block, block_bytes});
+  index.emplace(name, entries.begin());
+  bytes += block_bytes;
+  while (entries.size() > 1 && bytes > budget_bytes) {
+    bytes -= entries.back().bytes;
+    index.erase(entries.back().name);
+    entries.pop_back();
+  }
+}
+
+BlockCache::BlockCache(std::size_t budget_bytes) : state_(std::make_unique<State>(budget_bytes)) {}
+BlockCache::~BlockCache() = default;
+
+Result<Frozen<raster::HeightGrid>> BlockCache::heights(const BlockKey& key, const DecodeHeights& decode) {
+  return state_->find_or_decode<raster::HeightGrid>(Name{key, false}, decode);
+}
+
+Result<Frozen<raster::Image>> BlockCache::image(const BlockKey& key, const DecodeImage& decode) {
+  return state_->find_or_decode<raster::Image>(Name{key, true}, decode);
+}
+
+std::size_t BlockCache::bytes() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->bytes;
+}
+
+std::size_t BlockCache::budget_bytes() const { return state_->budget_bytes; }
+
+}  // namespace tellurion::cache

@@ -1,0 +1,52 @@
+// Decoded blocks of rasters under a budget in bytes.
+// Thread-safe. A block that two threads want is decoded once: the second waits for the first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "base/frozen.h"
+#include "base/result.h"
+#include "raster/height_grid.h"
+#include "raster/image.h"
+
+namespace tellurion::cache {
+
+inline constexpr int kBlockSide = 256;  ///< samples; blocks at a level's right and lower border are smaller
+
+/// Names a block: which source (and its revision), which level, which column and row of blocks.
+struct BlockKey {
+  std::uint32_t source = 0;
+  std::uint32_t level = 0;
+  std::int32_t column = 0;
+  std::int32_t row = 0;
+
+  friend bool operator==(const BlockKey&, const BlockKey&) = default;
+};
+
+/// Least recently used first; holds at most the budget plus one block.
+class BlockCache {
+ public:
+  explicit BlockCache(std::size_t budget_bytes);
+  ~BlockCache();
+  BlockCache(const BlockCache&) = delete;
+  BlockCache& operator=(const BlockCache&) = delete;
+
+  using DecodeHeights = std::function<Result<raster::HeightGrid>()>;
+  using DecodeImage = std::function<Result<raster::Image>()>;
+
+  /// The block, decoded by `decode` if it is not there. An error is passed on and not kept.
+  Result<Frozen<raster::HeightGrid>> heights(const BlockKey& key, const DecodeHeights& decode);
+  Result<Frozen<raster::Image>> image(const BlockKey& key, const DecodeImage& decode);
+
+  std::size_t bytes() const;
+  std::size_t budget_bytes() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tellurion::cache

@@ -1,0 +1,57 @@
+// One worker's view of a raster through the block cache: samples at continuous pixel coordinates.
+// Not thread-safe (holds a reader and the last blocks); the cache behind it is shared.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "cache/block_cache.h"
+#include "source/raster_source.h"
+
+namespace tellurion::cache {
+
+/// A height and how much of it is data: 1 where all neighbouring samples are valid, falling linearly to 0 across the cell
+/// next to a void, and across one pixel beyond the raster's border.
+struct HeightSample {
+  double metres = 0.0;  ///< mean of the valid neighbours by their bilinear weights, as GDAL has it; 0 if coverage is 0
+  double coverage = 0.0;
+};
+
+class CachedRaster {
+ public:
+  /// `source` and `cache` outlive this. `id` is the source's number in the cache's keys.
+  static Result<CachedRaster> open(const source::RasterSource& source, BlockCache& cache, std::uint32_t id);
+
+  const source::RasterDescription& description() const { return source_->description(); }
+  source::RasterReader& reader() { return *reader_; }
+
+  /// Bilinear heights at `pixels` (continuous, of level 0), from the samples of `level`.
+  /// Between 0.5 pixels inside and the border the outermost samples are continued. NaN pixels: coverage 0.
+  Result<void> sample_heights(int level, std::span<const glm::dvec2> pixels, std::span<HeightSample> heights);
+
+  /// Nearest sample of level 0; coverage 0 or 1.
+  Result<HeightSample> nearest_height(glm::dvec2 pixel);
+
+  /// The pixels of `window` at `level`; what lies outside the raster repeats its border, or wraps round where it wraps.
+  Result<raster::Image> read_colours(int level, const source::PixelWindow& window);
+
+ private:
+  CachedRaster() = default;
+  Result<const raster::HeightGrid*> height_block(int level, int column, int row);
+
+  const source::RasterSource* source_ = nullptr;
+  std::unique_ptr<source::RasterReader> reader_;
+  BlockCache* cache_ = nullptr;
+  std::uint32_t id_ = 0;
+  struct Held {
+    BlockKey key;
+    Frozen<raster::HeightGrid> block;
+  };
+  std::vector<Held> held_;  ///< the last blocks used, few
+};
+
+}  // namespace tellurion::cache

@@ -1,0 +1,238 @@
+#include "source/gdal/gdal_reader.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "raster/box_average.h"
+
+namespace tellurion::source {
+namespace {
+
+std::size_t area(const PixelWindow& window) { return static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height); }
+
+}  // namespace
+
+GdalReader::GdalReader(std::shared_ptr<const GdalLayout> layout, GDALDatasetUniquePtr dataset, PixelMapping mapping, std::optional<VerticalDatum> datum)
+    : layout_(std::move(layout)), dataset_(std::move(dataset)), mapping_(std::move(mapping)), datum_(std::move(datum)) {}
+
+Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalLayout> layout) {
+  Result<GDALDatasetUniquePtr> dataset = open_dataset(layout->options.path);
+  if (!dataset) return dataset.error();
+  const LevelSize& full = layout->description.levels.front();
+  if (dataset.value()->GetRasterXSize() != full.width || dataset.value()->GetRasterYSize() != full.height ||
+      dataset.value()->GetRasterCount() != layout->description.band_count) {
+    return Error{ErrorCode::unavailable, fmt::format("{}: has changed since it was opened; open it again", layout->options.path)};
+  }
+  Result<PixelMapping> mapping = PixelMapping::create(layout->georeference, layout->world);
+  if (!mapping) return mapping.error();
+  std::optional<VerticalDatum> datum;
+  if (!layout->vertical.empty()) {
+    Result<VerticalDatum> made = VerticalDatum::create(layout->vertical);
+    if (!made) return made.error();
+    datum = std::move(made).value();
+  }
+  return std::unique_ptr<GdalReader>(new GdalReader(std::move(layout), std::move(dataset).value(), std::move(mapping).value(), std::move(datum)));
+}
+
+GDALRasterBand& GdalReader::band(int number, int overview) const {
+  GDALRasterBand* full = dataset_->GetRasterBand(number);
+  GDALRasterBand* smaller = overview >= 0 ? full->GetOverview(overview) : nullptr;
+  return smaller != nullptr ? *smaller : *full;
+}
+
+Result<void> GdalReader::read_samples(GDALRasterBand& from, const PixelWindow& window, std::vector<double>& samples) const {
+  const QuietErrors quiet;
+  samples.resize(area(window));
+  const CPLErr status = from.RasterIO(GF_Read, window.x, window.y, window.width, window.height, samples.data(), window.width, window.height,
+                                      GDT_Float64, 0, 0, nullptr);
+  if (status == CE_None) return {};
+  return {ErrorCode::corrupt, fmt::format("{}: cannot read columns {} to {} of rows {} to {}: {}", layout_->options.path, window.x,
+                                          window.x + window.width - 1, window.y, window.y + window.height - 1, quiet.last())};
+}
+
+// --- Heights ---------------------------------------------------------------------------------------------------------
+
+Result<raster::HeightGrid> GdalReader::heights_of_overview(int overview, const PixelWindow& window) const {
+  const HeightPlan& plan = layout_->heights;
+  GDALRasterBand& from = band(1, overview);
+  std::vector<double> samples;
+  if (Result<void> read = read_samples(from, window, samples); !read) return read.error();
+  std::vector<double> mask;
+  const int flags = from.GetMaskFlags();
+  if ((flags & (GMF_ALL_VALID | GMF_NODATA)) == 0) {
+    if (Result<void> read = read_samples(*from.GetMaskBand(), window, mask); !read) return read.error();
+  }
+  const bool is_float = from.GetRasterDataType() == GDT_Float32;
+  const double no_data = plan.no_data ? (is_float ? static_cast<double>(static_cast<float>(*plan.no_data)) : *plan.no_data)
+                                      : std::numeric_limits<double>::quiet_NaN();
+  raster::HeightGrid grid{window.width, window.height, std::vector<float>(samples.size(), raster::kNoHeight)};
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double sample = samples[i];
+    if (sample == no_data || (plan.int16_voids && sample <= -32767.0) || (!mask.empty() && mask[i] == 0.0)) continue;
+    const double metres = sample * plan.scale + plan.offset;
+    if (std::abs(metres) <= plan.limit_metres) grid.metres[i] = static_cast<float>(metres);
+  }
+  return grid;
+}
+
+/// A level that the file lacks: the samples of a finer one, averaged strip by strip.
+template <class Data, class Read>
+Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Read& read) const {
+  const LevelSize size = layout_->description.levels[static_cast<std::size_t>(level)];
+  const int overview = layout_->levels[static_cast<std::size_t>(level)].overview;
+  GDALRasterBand& fine = band(layout_->description.kind == SampleKind::height ? 1 : layout_->colours.bands.front(), overview);
+  const double step_x = static_cast<double>(fine.GetXSize()) / size.width;
+  const double step_y = static_cast<double>(fine.GetYSize()) / size.height;
+  raster::BoxAverage average({window.width, window.height, window.x * step_x, window.y * step_y, step_x, step_y});
+  const int left = static_cast<int>(std::floor(window.x * step_x));
+  const int right = std::min(static_cast<int>(std::ceil((window.x + window.width) * step_x)), fine.GetXSize());
+  const int top = static_cast<int>(std::floor(window.y * step_y));
+  const int bottom = std::min(static_cast<int>(std::ceil((window.y + window.height) * step_y)), fine.GetYSize());
+  constexpr int kStripSamples = 1 << 20;
+  const int strip_rows = std::max(1, kStripSamples / (right - left));
+  for (int row = top; row < bottom; row += strip_rows) {
+    const PixelWindow strip{left, row, right - left, std::min(strip_rows, bottom - row)};
+    Result<Data> samples = read(overview, strip);
+    if (!samples) return samples.error();
+    average.add(samples.value(), left, row);
+  }
+  if constexpr (std::is_same_v<Data, raster::HeightGrid>) {
+    return average.heights();
+  } else {
+    return average.image();
+  }
+}
+
+/// Adds the undulation at every sample.
+void GdalReader::raise_to_ellipsoid(raster::HeightGrid& grid, int level, const PixelWindow& window) {
+  const glm::dvec2 scale = level_scale(layout_->description, level);
+  std::vector<glm::dvec2> pixels;
+  pixels.reserve(area(window));
+  for (int y = 0; y < window.height; ++y) {
+    for (int x = 0; x < window.width; ++x) pixels.push_back(glm::dvec2(window.x + x + 0.5, window.y + y + 0.5) / scale);
+  }
+  std::vector<geo::LatLon> places(pixels.size());
+  mapping_.to_places(pixels, places);
+  std::vector<double> undulations(pixels.size());
+  datum_->undulations(places, undulations);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    grid.metres[i] = static_cast<float>(static_cast<double>(grid.metres[i]) * datum_->slope() + undulations[i]);
+  }
+}
+
+Result<raster::HeightGrid> GdalReader::read_heights(int level, const PixelWindow& window) {
+  const QuietErrors quiet;
+  const LevelPlan& plan = layout_->levels[static_cast<std::size_t>(level)];
+  const auto read = [this](int overview, const PixelWindow& part) { return heights_of_overview(overview, part); };
+  Result<raster::HeightGrid> grid = plan.direct ? read(plan.overview, window) : averaged<raster::HeightGrid>(level, window, read);
+  if (grid && datum_) raise_to_ellipsoid(grid.value(), level, window);
+  return grid;
+}
+
+// --- Colours ---------------------------------------------------------------------------------------------------------
+
+Result<raster::Image> GdalReader::colours_of_overview(int overview, const PixelWindow& window) const {
+  const ColourPlan& plan = layout_->colours;
+  const std::size_t count = area(window);
+  raster::Image image{window.width, window.height, std::vector<std::uint8_t>(count * 4)};
+  std::vector<std::vector<double>> samples(plan.bands.size());
+  for (std::size_t b = 0; b < plan.bands.size(); ++b) {
+    if (Result<void> read = read_samples(band(plan.bands[b], overview), window, samples[b]); !read) return read.error();
+  }
+  std::vector<double> alpha;
+  double full_alpha = 255.0;
+  GDALRasterBand& first = band(plan.bands.front(), overview);
+  if (plan.alpha_band) {
+    GDALRasterBand& from = band(plan.alpha_band, overview);
+    if (Result<void> read = read_samples(from, window, alpha); !read) return read.error();
+    if (from.GetRasterDataType() == GDT_UInt16) full_alpha = 65535.0;
+  } else if ((first.GetMaskFlags() & (GMF_ALL_VALID | GMF_NODATA)) == 0) {
+    if (Result<void> read = read_samples(*first.GetMaskBand(), window, alpha); !read) return read.error();
+  }
+
+  const bool has_no_data = std::all_of(plan.no_data.begin(), plan.no_data.end(), [](const auto& value) { return value.has_value(); });
+  for (std::size_t i = 0; i < count; ++i) {
+    bool is_void = has_no_data;
+    for (std::size_t b = 0; is_void && b < samples.size(); ++b) is_void = samples[b][i] == *plan.no_data[b];
+    std::uint8_t* out = &image.rgba[i * 4];
+    if (plan.model == ColourModel::palette) {
+      const double index = samples[0][i];
+      if (!is_void && index >= 0.0 && index < static_cast<double>(plan.palette.size())) {
+        const std::array<std::uint8_t, 4>& colour = plan.palette[static_cast<std::size_t>(index)];
+        std::copy(colour.begin(), colour.end(), out);
+      }
+      continue;
+    }
+    std::array<double, 4> unit{};  // each 0..1
+    for (std::size_t b = 0; b < samples.size(); ++b) {
+      unit[b] = std::clamp((samples[b][i] - ranges_[b].low) / (ranges_[b].high - ranges_[b].low), 0.0, 1.0);
+      is_void = is_void || !std::isfinite(samples[b][i]);
+    }
+    const double opacity = is_void ? 0.0 : (alpha.empty() ? 1.0 : std::clamp(alpha[i] / full_alpha, 0.0, 1.0));
+    if (opacity == 0.0) continue;
+    const auto encoded = [opacity](double c) { return static_cast<std::uint8_t>(c * opacity * 255.0 + 0.5); };
+    if (plan.model == ColourModel::cmyk) {
+      for (std::size_t c = 0; c < 3; ++c) out[c] = encoded((1.0 - unit[c]) * (1.0 - unit[3]));
+    } else {
+      for (std::size_t c = 0; c < 3; ++c) out[c] = encoded(unit[plan.model == ColourModel::rgb ? c : 0]);
+    }
+    out[3] = static_cast<std::uint8_t>(opacity * 255.0 + 0.5);
+  }
+  return image;
+}
+
+/// What is black and what is white: of 8-bit bands known; of others the 2nd and 98th percentile of 16 x 16 windows of
+/// 16 x 16 samples spread evenly over the raster's coarsest own level, so that every reader finds the same.
+Result<void> GdalReader::find_ranges() {
+  const ColourPlan& plan = layout_->colours;
+  std::vector<Range> ranges;
+  for (std::size_t b = 0; b < plan.bands.size(); ++b) {
+    if (plan.full_scale) {
+      ranges.push_back({0.0, *plan.full_scale});
+      continue;
+    }
+    GDALRasterBand& from = band(plan.bands[b], layout_->levels.back().overview);
+    std::vector<double> all;
+    std::vector<double> samples;
+    constexpr int kWindows = 16;
+    for (int w = 0; w < kWindows * kWindows; ++w) {
+      const int width = std::max(1, std::min(16, from.GetXSize() / kWindows));
+      const int height = std::max(1, std::min(16, from.GetYSize() / kWindows));
+      const auto place = [](int i, int size, int part) { return static_cast<int>((static_cast<long long>(size) - part) * i / (kWindows - 1)); };
+      const PixelWindow window{place(w % kWindows, from.GetXSize(), width), place(w / kWindows, from.GetYSize(), height), width, height};
+      if (Result<void> read = read_samples(from, window, samples); !read) return read;
+      for (const double sample : samples) {
+        if (std::isfinite(sample) && !(plan.no_data[b] && sample == *plan.no_data[b])) all.push_back(sample);
+      }
+    }
+    Range range;
+    if (!all.empty()) {
+      const auto at = [&](double share) {
+        const auto nth = all.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(all.size() - 1));
+        std::nth_element(all.begin(), nth, all.end());
+        return *nth;
+      };
+      range = {at(0.02), at(0.98)};
+      if (!(range.high > range.low)) range = {range.low, range.low + 1.0};
+    }
+    ranges.push_back(range);
+  }
+  ranges_ = std::move(ranges);
+  return {};
+}
+
+Result<raster::Image> GdalReader::read_colours(int level, const PixelWindow& window) {
+  const QuietErrors quiet;
+  if (ranges_.empty()) {
+    if (Result<void> found = find_ranges(); !found) return found.error();
+  }
+  const LevelPlan& plan = layout_->levels[static_cast<std::size_t>(level)];
+  const auto read = [this](int overview, const PixelWindow& part) { return colours_of_overview(overview, part); };
+  return plan.direct ? read(plan.overview, window) : averaged<raster::Image>(level, window, read);
+}
+
+}  // namespace tellurion::source

@@ -1,0 +1,107 @@
+#include "source/gdal/gdal_source.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "source/gdal/gdal_layout.h"
+#include "source/gdal/gdal_reader.h"
+#include "source/gdal/gdal_runtime.h"
+#include "source/grid_coverage.h"
+#include "source/proj/vertical_datum.h"
+
+namespace tellurion::source {
+namespace {
+
+class GdalSource final : public RasterSource {
+ public:
+  GdalSource(std::shared_ptr<const GdalLayout> layout, GridCoverage coverage) : layout_(std::move(layout)), coverage_(std::move(coverage)) {}
+
+  const RasterDescription& description() const override { return layout_->description; }
+  const Coverage& coverage() const override { return coverage_; }
+  std::string revision() const override { return layout_->revision; }
+  Result<std::unique_ptr<RasterReader>> open_reader() const override {
+    Result<std::unique_ptr<GdalReader>> reader = GdalReader::open(layout_);
+    if (!reader) return reader.error();
+    return std::unique_ptr<RasterReader>(std::move(reader).value());
+  }
+
+ private:
+  std::shared_ptr<const GdalLayout> layout_;
+  GridCoverage coverage_;
+};
+
+Error naming(const GdalOptions& options, const Error& error) { return {error.code, fmt::format("{}: {}", options.path, error.message)}; }
+
+/// Fills in which heights the samples are; a vertical CRS of the file counts unless the options say otherwise.
+Result<void> choose_vertical(GdalLayout& layout, const CrsFacts& facts) {
+  const GdalOptions& options = layout.options;
+  RasterDescription& about = layout.description;
+  const std::string wanted = options.vertical.value_or(facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : about.crs_wkt);
+  about.vertical = kEllipsoidDatum;
+  about.vertical_declared = !wanted.empty();
+  if (wanted == kEllipsoidDatum || about.kind != SampleKind::height) return {};
+  if (wanted.empty()) {
+    about.hints.push_back(fmt::format("{} declares no vertical datum: its heights are taken as above the ellipsoid, which can be 100 m off; "
+                                      "say vertical = \"ellipsoid\", \"egm96\" or another in the world file.", options.path));
+    return {};
+  }
+  if (std::abs(layout.world.a() / geo::kWgs84.a() - 1.0) > 0.01) {
+    return {ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", wanted)};
+  }
+  Result<VerticalDatum> datum = VerticalDatum::create(wanted);
+  if (!datum) return datum.error();
+  layout.vertical = wanted;
+  about.vertical = options.vertical.value_or(facts.vertical);
+  return {};
+}
+
+/// The raster with one pixel round it (heights reach that far), without what lies beyond a pole of a geographic raster.
+PixelRange reach_of(const GdalLayout& layout, PixelMapping& mapping) {
+  const glm::dvec2 size(layout.georeference.width, layout.georeference.height);
+  PixelRange range{mapping.wraps() ? glm::dvec2(0.0, -1.0) : glm::dvec2(-1.0), mapping.wraps() ? size + glm::dvec2(0.0, 1.0) : size + 1.0};
+  const auto is_place = [&](double y) { return std::isfinite(mapping.to_place({size.x / 2, y}).latitude.value); };
+  const auto last_place = [&](double inside, double beyond) {
+    if (is_place(beyond) || !is_place(inside)) return beyond;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (inside + beyond);
+      (is_place(middle) ? inside : beyond) = middle;
+    }
+    return inside;
+  };
+  range.lower.y = last_place(size.y / 2, range.lower.y);
+  range.upper.y = last_place(size.y / 2, range.upper.y);
+  return range;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RasterSource>> open_gdal(const GdalOptions& options, const geo::Ellipsoid& world) {
+  Result<GDALDatasetUniquePtr> dataset = open_dataset(options.path);
+  if (!dataset) return dataset.error();
+  Result<GdalLayout> inspected = inspect(*dataset.value(), options, world);
+  if (!inspected) return inspected.error();
+  auto layout = std::make_shared<GdalLayout>(std::move(inspected).value());
+
+  Result<PixelMapping> mapping = PixelMapping::create(layout->georeference, world);
+  if (!mapping) return naming(options, mapping.error());
+  if (Result<void> chosen = choose_vertical(*layout, mapping->facts()); !chosen) return naming(options, chosen.error());
+
+  RasterDescription& about = layout->description;
+  about.crs_name = mapping->facts().name;
+  about.ellipsoid = mapping->facts().ellipsoid;
+  about.wraps = mapping->wraps();
+  const ToPlaces to_places = [&](std::span<const glm::dvec2> pixels, std::span<geo::LatLon> places) { mapping->to_places(pixels, places); };
+  const PixelRange reach = reach_of(*layout, mapping.value());
+  const glm::dvec2 size(layout->georeference.width, layout->georeference.height);
+  about.bounds = bounds_of({glm::max(reach.lower, glm::dvec2(0.0)), glm::min(reach.upper, size)}, to_places);
+  about.spacing = spacing_at(0.5 * size, world, to_places);
+  GridCoverage coverage(reach, world, to_places);
+  return std::unique_ptr<RasterSource>(std::make_unique<GdalSource>(std::move(layout), std::move(coverage)));
+}
+
+}  // namespace tellurion::source
