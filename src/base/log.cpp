@@ -1,20 +1,24 @@
 #include "base/log.h"
 
-#include <memory>
-#include <string>
-
 #include <spdlog/logger.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
+
+#include <memory>
+#include <string>
 
 namespace tellurion::log {
 namespace {
 
 spdlog::level::level_enum level_of(Severity severity) {
   switch (severity) {
-    case Severity::debug: return spdlog::level::debug;
-    case Severity::info: return spdlog::level::info;
-    case Severity::warning: return spdlog::level::warn;
-    case Severity::error: return spdlog::level::err;
+    case Severity::debug:
+      return spdlog::level::debug;
+    case Severity::info:
+      return spdlog::level::info;
+    case Severity::warning:
+      return spdlog::level::warn;
+    case Severity::error:
+      return spdlog::level::err;
   }
   return spdlog::level::err;
 }
@@ -33,10 +37,14 @@ spdlog::logger& logger() {
 
 const char* prefix_of(Severity severity) {
   switch (severity) {
-    case Severity::debug: return "debug: ";
-    case Severity::info: return "";
-    case Severity::warning: return "warning: ";
-    case Severity::error: return "error: ";
+    case Severity::debug:
+      return "debug: ";
+    case Severity::info:
+      return "";
+    case Severity::warning:
+      return "warning: ";
+    case Severity::error:
+      return "error: ";
   }
   return "";
 }

@@ -23,8 +23,14 @@ struct Quantity {
   friend constexpr Quantity operator*(double s, Quantity a) { return Quantity(s * a.value); }
   friend constexpr Quantity operator/(Quantity a, double s) { return Quantity(a.value / s); }
   friend constexpr double operator/(Quantity a, Quantity b) { return a.value / b.value; }
-  constexpr Quantity& operator+=(Quantity b) { value += b.value; return *this; }
-  constexpr Quantity& operator-=(Quantity b) { value -= b.value; return *this; }
+  constexpr Quantity& operator+=(Quantity b) {
+    value += b.value;
+    return *this;
+  }
+  constexpr Quantity& operator-=(Quantity b) {
+    value -= b.value;
+    return *this;
+  }
 };
 
 using Metres = Quantity<struct MetresUnit>;

@@ -1,9 +1,9 @@
 #include "base/time.h"
 
+#include <fmt/format.h>
+
 #include <cassert>
 #include <optional>
-
-#include <fmt/format.h>
 
 namespace tellurion {
 namespace {

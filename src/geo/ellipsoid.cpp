@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
-
 #include <glm/geometric.hpp>
+#include <numbers>
 
 namespace tellurion::geo {
 namespace {
@@ -137,8 +136,8 @@ Transform<Ecef, Enu> enu_at(const Ellipsoid& ellipsoid, const Geodetic& origin) 
 double intersect_ray(const Ellipsoid& ellipsoid, Metres height, const Point<Ecef>& eye, const Vector<Ecef>& direction) {
   double t = intersect_axes(ellipsoid.a() + height.value, ellipsoid.b() + height.value, eye.xyz, direction.xyz);
   if (t < 0.0 || height.value == 0.0 || ellipsoid.a() == ellipsoid.b()) return t;
-  // The surface of equal height is no ellipsoid, but nearly the one with the raised axes: a few steps of Newton's method,
-  // none where the ray grazes it.
+  // The surface of equal height is no ellipsoid, but nearly the one with the raised axes: a few steps of Newton's
+  // method, none where the ray grazes it.
   for (int step = 0; step < 4; ++step) {
     const Geodetic here = to_geodetic(ellipsoid, eye + direction * t);
     const double climb = glm::dot(normal_at(place_of(here)).xyz, direction.xyz);

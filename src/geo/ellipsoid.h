@@ -1,6 +1,7 @@
 // An ellipsoid of revolution and the conversions between geodetic and body-centred positions.
 // Thread-safe: pure functions, no state.
-// Reverse method: Vermeille (2002), doi:10.1007/s00190-002-0273-6, extended by Vermeille (2011), doi:10.1007/s00190-010-0419-x.
+// Reverse method: Vermeille (2002), doi:10.1007/s00190-002-0273-6, extended by Vermeille (2011),
+// doi:10.1007/s00190-010-0419-x.
 #pragma once
 
 #include "geo/frames.h"
@@ -29,7 +30,8 @@ inline constexpr Ellipsoid kMars{Metres(3396190.0), Metres(3376200.0)};
 /// Unit normal of the ellipsoid at `place` (the n-vector). The same on every ellipsoid.
 Vector<Ecef> normal_at(const LatLon& place);
 
-/// Latitude and longitude of a normal (need not have unit length; must not be zero). Longitude in (-pi, pi], 0 at the poles.
+/// Latitude and longitude of a normal (need not have unit length; must not be zero). Longitude in (-pi, pi], 0 at the
+/// poles.
 LatLon place_of_normal(const Vector<Ecef>& normal);
 
 /// The point of the ellipsoid's surface where the outward normal is `unit_normal`.

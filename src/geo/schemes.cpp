@@ -61,8 +61,8 @@ Result<MapKey> parse_quadkey(std::string_view text) {
     }
   }
   if (key.level != text.size()) {
-    return Error{ErrorCode::invalid_argument, "no quadkey: '" + std::string(text.substr(0, 80)) +
-                                                  "' (wanted: at most 30 digits of 0 to 3)"};
+    return Error{ErrorCode::invalid_argument,
+                 "no quadkey: '" + std::string(text.substr(0, 80)) + "' (wanted: at most 30 digits of 0 to 3)"};
   }
   return key;
 }

@@ -1,16 +1,15 @@
 // The two schemes in which the world serves its map tiles: geographic and Web Mercator.
-// Thread-safe: pure functions. Column 0 begins at longitude -180; row 0 is the northernmost (TMS counts from the south).
-// Web Mercator: OGC 17-083r4 (WebMercatorQuad); geographic: the same, WorldCRS84Quad. Angles are geodetic.
+// Thread-safe: pure functions. Column 0 begins at longitude -180; row 0 is the northernmost (TMS counts from the
+// south). Web Mercator: OGC 17-083r4 (WebMercatorQuad); geographic: the same, WorldCRS84Quad. Angles are geodetic.
 #pragma once
 
 #include <compare>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include <glm/vec2.hpp>
 
 #include "base/quantity.h"
 #include "base/result.h"
@@ -64,8 +63,8 @@ GeodeticBounds bounds_of(MapScheme scheme, const MapKey& key);
 /// east or south of it, at the southern end to the last row.
 std::optional<MapKey> map_key_at(MapScheme scheme, const LatLon& place, int level);
 
-/// Position on the scheme's map: (0, 0) its north-west corner, (1, 1) the south-eastern one. Longitude is wrapped into [0, 1);
-/// a latitude beyond Web Mercator's cut-off gives y outside of [0, 1] (infinite at the poles).
+/// Position on the scheme's map: (0, 0) its north-west corner, (1, 1) the south-eastern one. Longitude is wrapped into
+/// [0, 1); a latitude beyond Web Mercator's cut-off gives y outside of [0, 1] (infinite at the poles).
 glm::dvec2 to_map(MapScheme scheme, const LatLon& place);
 /// The reverse of to_map, for any x (not wrapped) and y.
 LatLon from_map(MapScheme scheme, glm::dvec2 position);

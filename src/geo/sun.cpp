@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <numbers>
 
 #include "geo/body.h"
 
@@ -31,7 +30,8 @@ double days_since_2000(UtcTime time) {
   return static_cast<double>((time - kEpoch).count()) / 86400e3;
 }
 
-/// The same in terrestrial time, of which UTC has fallen behind by 29 s in 1950 to 69 s in 2017 (this line: within 5 s).
+/// The same in terrestrial time, of which UTC has fallen behind by 29 s in 1950 to 69 s in 2017 (this line: within 5
+/// s).
 double terrestrial_days(double days) {
   const double years_since_1950 = days / 365.25 + 50.0;
   return days + std::min(69.2, 29.0 + 0.6 * years_since_1950) / 86400.0;
@@ -101,7 +101,8 @@ Vector<Ecef> sun_over_moon(UtcTime time) {
   const double days = terrestrial_days(days_since_2000(time));
   const SolarPlace sun = solar_place(days);
   const glm::dvec3 from_moon = direction(sun.longitude, 0.0) * (sun.distance * kAstronomicalUnit) - moon_position(days);
-  // To the equator of 2000, in which the IAU gives the poles: precession is a turn about the ecliptic's pole to 0.01 degrees.
+  // To the equator of 2000, in which the IAU gives the poles: precession is a turn about the ecliptic's pole to 0.01
+  // degrees.
   const double precession = 1.396971 * days / 36525.0;
   const glm::dvec3 equatorial = turned_about_x(turned_about_z(from_moon, -precession), mean_obliquity(0.0));
 

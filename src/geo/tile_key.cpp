@@ -4,10 +4,9 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
-#include <numbers>
-
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 
 namespace tellurion::geo {
 namespace {
@@ -129,8 +128,8 @@ TileKey neighbour(const TileKey& key, Side side) {
       step.x = -1.0;
       break;
   }
-  // Over the edge of a cube whose half side counts `half` half cells (exact in doubles): the neighbour's middle lies on the
-  // face that we step onto, half a cell below the face that we leave.
+  // Over the edge of a cube whose half side counts `half` half cells (exact in doubles): the neighbour's middle lies on
+  // the face that we step onto, half a cell below the face that we leave.
   const double half = std::ldexp(1.0, key.level);
   const FaceAxes& from = kFaces[key.face];
   const glm::dvec3 outward = from.right * step.x + from.down * step.y;
@@ -153,8 +152,7 @@ FaceRect face_rect(const TileKey& key) {
 Vector<Ecef> face_normal(int face, glm::dvec2 uv) {
   assert(face >= 0 && face < kFaceCount && std::abs(uv.x) < 2.0 && std::abs(uv.y) < 2.0);
   const FaceAxes& axes = kFaces[face];
-  const glm::dvec3 on_cube =
-      axes.out + axes.right * slope_of(uv.x) + axes.down * slope_of(uv.y);
+  const glm::dvec3 on_cube = axes.out + axes.right * slope_of(uv.x) + axes.down * slope_of(uv.y);
   // Division, with the sum in the order of the ECEF axes: the same bits from either side of an edge.
   return {on_cube / std::sqrt(on_cube.x * on_cube.x + on_cube.y * on_cube.y + on_cube.z * on_cube.z)};
 }
@@ -178,7 +176,8 @@ std::optional<glm::dvec2> project_to_face(int face, const Vector<Ecef>& normal) 
   const FaceAxes& axes = kFaces[face];
   const double out = glm::dot(normal.xyz, axes.out);
   if (!(out > 0.0)) return std::nullopt;
-  return glm::dvec2(coordinate_of(glm::dot(normal.xyz, axes.right) / out), coordinate_of(glm::dot(normal.xyz, axes.down) / out));
+  return glm::dvec2(coordinate_of(glm::dot(normal.xyz, axes.right) / out),
+                    coordinate_of(glm::dot(normal.xyz, axes.down) / out));
 }
 
 TileKey tile_at(const Vector<Ecef>& normal, int level) {
@@ -219,7 +218,8 @@ Result<TileKey> parse_tile_key(std::string_view text) {
     at = next;
   }
   if (at != end || numbers[0] > 255 || numbers[1] > 255) return fail();
-  const TileKey key{static_cast<std::uint8_t>(numbers[0]), static_cast<std::uint8_t>(numbers[1]), numbers[2], numbers[3]};
+  const TileKey key{static_cast<std::uint8_t>(numbers[0]), static_cast<std::uint8_t>(numbers[1]), numbers[2],
+                    numbers[3]};
   if (!is_valid(key)) return fail();
   return key;
 }

@@ -2,8 +2,9 @@
 // Thread-safe: pure functions.
 //
 // A face is spanned by (u, v) in [-1, 1]^2; the normal there is normalize(out + tan(u pi/4) right + tan(v pi/4) down).
-// Faces 0..3 look to longitude 0, 90, 180, -90 with u to the east and v to the south; face 4 is the north pole, face 5 the
-// south pole, with u to the east seen from face 0 and v away from the north as face 0 continues. Row 0 is the lowest v.
+// Faces 0..3 look to longitude 0, 90, 180, -90 with u to the east and v to the south; face 4 is the north pole, face 5
+// the south pole, with u to the east seen from face 0 and v away from the north as face 0 continues. Row 0 is the
+// lowest v.
 #pragma once
 
 #include <array>
@@ -11,11 +12,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/vec2.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include <glm/vec2.hpp>
 
 #include "base/result.h"
 #include "geo/frames.h"
@@ -74,10 +74,12 @@ struct FaceRect {
 };
 FaceRect face_rect(const TileKey& key);
 
-/// Unit normal at face coordinates; also defined a little outside of [-1, 1] (|u|, |v| < 2), as the face's continuation.
+/// Unit normal at face coordinates; also defined a little outside of [-1, 1] (|u|, |v| < 2), as the face's
+/// continuation.
 Vector<Ecef> face_normal(int face, glm::dvec2 uv);
 
-/// Unit normal at tile coordinates `st`: (0, 0) is the corner of lowest u and v, (1, 1) the opposite one. May lie outside.
+/// Unit normal at tile coordinates `st`: (0, 0) is the corner of lowest u and v, (1, 1) the opposite one. May lie
+/// outside.
 Vector<Ecef> tile_normal(const TileKey& key, glm::dvec2 st);
 
 /// The face on which `normal` lies and its coordinates there, each in [-1, 1]. On an edge the face of lowest number.

@@ -2,11 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
-#include <string>
-
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <numbers>
+#include <string>
 
 #include "base/number.h"
 

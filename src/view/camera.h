@@ -1,11 +1,10 @@
 // Where the eye is, where it looks, and what a pixel sees.
 #pragma once
 
-#include <string_view>
-
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
+#include <string_view>
 
 #include "base/quantity.h"
 #include "base/result.h"
@@ -17,9 +16,9 @@ namespace tellurion::view {
 /// A camera as users say it: `lat,lon,height[,heading[,pitch[,roll]]]`.
 struct Pose {
   geo::Geodetic position;
-  Radians heading{0.0};                          ///< clockwise from north
-  Radians pitch{-1.5707963267948966};            ///< from the horizon, up positive; straight down by default
-  Radians roll{0.0};                             ///< clockwise as the pilot sees it (right side down)
+  Radians heading{0.0};                ///< clockwise from north
+  Radians pitch{-1.5707963267948966};  ///< from the horizon, up positive; straight down by default
+  Radians roll{0.0};                   ///< clockwise as the pilot sees it (right side down)
 };
 
 /// Reads `lat,lon,height[,heading[,pitch[,roll]]]` in degrees and metres. Errors: invalid_argument, naming the text.
@@ -28,9 +27,9 @@ Result<Pose> parse_pose(std::string_view text);
 /// A perspective view. Camera axes: x right, y up, z towards the viewer (looks along -z).
 struct Camera {
   geo::Point<geo::Ecef> eye;
-  glm::dmat3 axes{1.0};       ///< columns: right, up, back, as unit vectors in ECEF
+  glm::dmat3 axes{1.0};  ///< columns: right, up, back, as unit vectors in ECEF
   Radians vertical_fov{0.7853981633974483};
-  int width = 1280;           ///< pixels
+  int width = 1280;  ///< pixels
   int height = 720;
 
   geo::Vector<geo::Ecef> forward() const { return {-axes[2]}; }
