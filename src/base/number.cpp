@@ -22,11 +22,12 @@ std::string_view trimmed(std::string_view text) {
 
 std::optional<double> parse_number(std::string_view text) {
   text = trimmed(text);
-  if (text.starts_with('+')) text.remove_prefix(1);
-  // Excludes signs twice, "inf", "nan" and hexadecimal notation.
-  const std::string_view unsigned_text = text.starts_with('-') ? text.substr(1) : text;
-  if (unsigned_text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
-      (unsigned_text.front() != '.' && (unsigned_text.front() < '0' || unsigned_text.front() > '9'))) {
+  std::string_view magnitude = text;
+  if (text.starts_with('+') || text.starts_with('-')) magnitude.remove_prefix(1);
+  if (text.starts_with('+')) text = magnitude;
+  // Shuts out second signs, "inf", "nan" and hexadecimal notation.
+  if (magnitude.empty() || magnitude.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
+      (magnitude.front() != '.' && (magnitude.front() < '0' || magnitude.front() > '9'))) {
     return std::nullopt;
   }
 #ifdef __cpp_lib_to_chars
