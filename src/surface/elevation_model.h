@@ -1,0 +1,95 @@
+// One elevation out of many height layers, at any place; and the tile contents built from it.
+// Worker side: an ElevationModel belongs to one thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "base/result.h"
+#include "cache/cached_raster.h"
+#include "geo/ellipsoid.h"
+#include "geo/tile_key.h"
+#include "source/raster_source.h"
+#include "surface/tile_content.h"
+
+namespace tellurion::surface {
+
+/// A layer of a group as the surface sees it: a source and its settings. Immutable. Lowest layer first in every list.
+struct Layer {
+  std::string name;
+  std::shared_ptr<const source::RasterSource> source;
+  std::uint32_t source_id = 0;   ///< number in the block cache's keys
+  bool enabled = true;
+  float opacity = 1.0f;
+  float gamma = 1.0f;
+  float multiplier = 1.0f;
+  bool adds = false;             ///< height layers: added to the ones below instead of replacing them
+};
+
+/// All that the surface is made of. Immutable, shared; a change makes a new one with a new revision.
+struct SurfaceDescription {
+  geo::Ellipsoid ellipsoid;
+  std::vector<Layer> heights;
+  std::vector<Layer> colours;
+  std::uint64_t revision = 0;
+};
+
+/// How to look a height up.
+enum class Lookup { nearest, bilinear };
+
+struct ElevationAnswer {
+  double metres = 0;        ///< above the ellipsoid; 0 where no layer has data
+  double spacing = 0;       ///< metres between the samples of the finest layer that contributed; infinite if none did
+};
+
+/// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
+/// continuous across voids and borders; 0 where there is nothing.
+class ElevationModel {
+ public:
+  static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
+
+  const SurfaceDescription& description() const { return *description_; }
+
+  /// Bilinear heights at places given by unit normals, from every layer's coarsest level whose samples are at most
+  /// `wanted_spacing` metres apart (0: the finest). Doubles: a float's step of 0.5 mm at 8 km would show in deep tiles.
+  Result<void> heights(std::span<const geo::Vector<geo::Ecef>> normals, double wanted_spacing, std::span<double> metres);
+  Result<void> heights(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres);
+
+  /// One height. The same answer from either side of any sample, tile or face border.
+  Result<ElevationAnswer> height_at(const geo::LatLon& place, Lookup lookup, double wanted_spacing = 0);
+
+  /// Unit normal of the elevation surface (bilinear) at `place`, ECEF.
+  Result<geo::Vector<geo::Ecef>> surface_normal_at(const geo::LatLon& place, double wanted_spacing = 0);
+
+  /// The enabled height layers' rasters, lowest first, and the settings of each.
+  std::size_t layer_count() const { return layers_.size(); }
+  const Layer& layer(std::size_t i) const { return *layers_[i].settings; }
+  cache::CachedRaster& raster(std::size_t i) { return layers_[i].raster; }
+
+ private:
+  struct HeightLayer {
+    const Layer* settings;
+    cache::CachedRaster raster;
+    geo::GeodeticBounds reach;  ///< outside of it the layer's coverage is 0
+  };
+
+  ElevationModel() = default;
+
+  std::shared_ptr<const SurfaceDescription> description_;
+  std::vector<HeightLayer> layers_;
+
+  // Kept between calls: one allocation serves all batches.
+  std::vector<geo::LatLon> places_;
+  std::vector<std::uint32_t> inside_;
+  std::vector<geo::LatLon> inside_places_;
+  std::vector<glm::dvec2> pixels_;
+  std::vector<cache::HeightSample> samples_;
+};
+
+/// The coarsest level of a raster whose samples are at most `wanted_spacing` metres apart; 0 if none is.
+int level_for_spacing(const source::RasterDescription& raster, double wanted_spacing);
+
+}  // namespace tellurion::surface

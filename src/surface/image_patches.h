@@ -1,0 +1,45 @@
+// Pieces of imagery for a tile's colour slot: windows of the sources and where each of their pixels lies in the slot.
+// A job of a worker: values and a stop token in, a result out.
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "base/result.h"
+#include "cache/cached_raster.h"
+#include "surface/elevation_model.h"
+#include "surface/tile_content.h"
+
+namespace tellurion::surface {
+
+/// The enabled colour layers as one worker reads them, lowest first. Belongs to one thread.
+class ColourModel {
+ public:
+  static Result<ColourModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
+
+  const SurfaceDescription& description() const { return *description_; }
+
+ private:
+  friend Result<TileImagery> build_imagery(ColourModel&, const geo::TileKey&, std::stop_token);
+
+  struct ColourLayer {
+    const Layer* settings;
+    cache::CachedRaster raster;
+  };
+
+  ColourModel() = default;
+
+  std::shared_ptr<const SurfaceDescription> description_;
+  std::vector<ColourLayer> layers_;
+};
+
+/// The patches of all layers that touch the tile, lowest first; layers wholly hidden by opaque ones above are left out.
+/// Between control points places err by less than a third of a texel, except within a texel or two of a pole of the source.
+/// Windows have about one to two pixels a texel on either axis, at most kLargestWindow on a side.
+/// Errors: those of reading, cancelled.
+Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop = {});
+
+inline constexpr int kLargestWindow = 1024;  ///< pixels
+
+}  // namespace tellurion::surface

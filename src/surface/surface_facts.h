@@ -1,0 +1,27 @@
+// What is known of a surface tile before anything of it is loaded: a pure function of its key.
+#pragma once
+
+#include <optional>
+
+#include "geo/tile_key.h"
+
+namespace tellurion::surface {
+
+struct TileFacts {
+  float min_height = 0;               ///< bounds of the heights under the tile, metres above the ellipsoid
+  float max_height = 0;
+  std::optional<float> height_error;  ///< largest deviation of the tile's own height grid from the finest data, metres, at
+                                      ///< exaggeration 1, at least that of every descendant. Nothing: known once it is built
+  bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
+  bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
+  bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels
+};
+
+/// Thread-safe, immutable; replaced as a whole when data sets or error tables change.
+class SurfaceFacts {
+ public:
+  virtual ~SurfaceFacts() = default;
+  virtual TileFacts facts_of(const geo::TileKey& key) const = 0;
+};
+
+}  // namespace tellurion::surface

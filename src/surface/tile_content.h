@@ -1,0 +1,97 @@
+// What a worker builds for a surface tile: geometry and imagery, ready to upload, and the numbers that the cut needs.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "geo/frames.h"
+#include "geo/tile_key.h"
+#include "raster/image.h"
+
+namespace tellurion::surface {
+
+inline constexpr int kGridSide = 65;           ///< height samples along a tile's side
+inline constexpr int kColourSlotSide = 256;    ///< texels of a colour slot along a side, gutters included
+inline constexpr int kColourGutter = 4;        ///< texels of it beyond each border of the tile
+inline constexpr int kSlopeSlotSide = 128;
+inline constexpr int kSlopeGutter = 2;
+
+/// Numbers that decide whether a tile is good enough. Bounds of the truth: the finest data under the tile.
+struct TileMetrics {
+  float min_height = 0;       ///< metres above the ellipsoid, of the true and of the drawn surface
+  float max_height = 0;
+  float height_error = 0;     ///< largest deviation of the drawn heights from the finest data, at exaggeration 1, metres
+  float curvature_error = 0;  ///< largest deviation that comes from the body's curvature alone, metres
+};
+
+/// One vertex. Position relative to the mesh's origin at exaggeration x, in Ecef axes, where
+/// up = origin_up + up_offset:
+///   base + x * (reference_height * up_offset + height * up) - skirt * skirt_depth * (up - lean)
+/// with lean a small outward step (see the shader). `morph` mixes parent_height (0) and height (1).
+struct TileVertex {
+  glm::vec3 base;         ///< point of the bare ellipsoid minus origin's point of the bare ellipsoid, metres
+  glm::vec3 up_offset;    ///< ellipsoid normal minus origin_up
+  float height;           ///< metres above reference_height
+  float parent_height;    ///< the same as the parent level shows it here
+  glm::vec2 st;           ///< tile coordinates in [0, 1]^2, (0, 0) = lowest u and v
+  float skirt;            ///< 0 on the surface, 1 for the lower rim of the skirt
+};
+
+/// A tile's triangles, counter-clockwise seen from outside.
+struct TileMesh {
+  geo::Point<geo::Ecef> origin_base;   ///< the tile centre's point of the bare ellipsoid
+  geo::Vector<geo::Ecef> origin_up;    ///< unit normal there
+  double reference_height = 0;         ///< metres; the origin at exaggeration x is origin_base + x * reference_height * origin_up
+  std::vector<TileVertex> vertices;    ///< surface first, then the skirt's lower rim
+  std::vector<std::uint16_t> indices;  ///< surface triangles first, then skirt
+  std::uint32_t surface_index_count = 0;
+
+  std::size_t bytes() const { return vertices.size() * sizeof(TileVertex) + indices.size() * sizeof(std::uint16_t); }
+};
+
+/// Slopes of the elevation for shading, finer than the mesh: kSlopeSlotSide^2 texels, gutters included, row 0 = lowest v.
+/// (dh/ds, dh/dt): metres of height per metre of ground along the tangent T_u and T_v at the texel, where T_u is `tangent`
+/// made orthogonal to the local up and normalised, and T_v = cross(T_u, up) (both are right-handed with row order: T_v points
+/// to growing t). The shading normal at exaggeration x is normalize(up - x * (ds * T_u + dt * T_v)).
+struct SlopeMap {
+  geo::Vector<geo::Ecef> tangent;      ///< unit vector at the tile's centre along growing s
+  std::vector<glm::vec2> slopes;       ///< empty: use the parent's
+};
+
+struct TileGeometry {
+  TileMesh mesh;
+  SlopeMap slopes;
+  TileMetrics metrics;
+};
+
+/// A piece of a source image to be drawn into a tile's colour slot, lowest layer first.
+/// The control points form a grid of (columns + 1) x (rows + 1) over the slot's tile coordinates from `lower` to `upper`.
+struct ImagePatch {
+  raster::Image image;                  ///< a window of one level of the source
+  int columns = 0;
+  int rows = 0;
+  glm::vec2 lower{0.0f};                ///< tile coordinates st of the first control point
+  glm::vec2 upper{1.0f};
+  std::vector<glm::vec2> image_points;  ///< texture coordinates in `image` ([0, 1] = whole window), row by row
+  bool opaque = false;                  ///< covers its whole rectangle with alpha 1
+  bool linear = true;                   ///< bilinear filtering; else nearest
+  float opacity = 1.0f;
+  float gamma = 1.0f;
+  float multiplier = 1.0f;
+};
+
+struct TileImagery {
+  std::vector<ImagePatch> patches;
+  std::size_t bytes() const {
+    std::size_t sum = 0;
+    for (const ImagePatch& p : patches) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);
+    return sum;
+  }
+};
+
+}  // namespace tellurion::surface
