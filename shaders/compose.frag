@@ -1,0 +1,23 @@
+// Bilinear between the control points, exact at every texel; colours are premultiplied and encoded.
+layout(location = 0) out vec4 o_colour;
+
+uniform sampler2D u_image;
+uniform vec4 u_image_texels;  // xy: size of the image in texels; zw: of the texture that holds it
+uniform vec3 u_adjust;        // opacity, gamma, multiplier
+
+flat in vec4 v_lower_points;
+flat in vec4 v_upper_points;
+in vec2 v_in_cell;
+
+void main() {
+  vec2 lower = mix(v_lower_points.xy, v_lower_points.zw, v_in_cell.x);
+  vec2 upper = mix(v_upper_points.xy, v_upper_points.zw, v_in_cell.x);
+  vec2 texel = mix(lower, upper, v_in_cell.y) * u_image_texels.xy;
+  texel = clamp(texel, vec2(0.5), u_image_texels.xy - 0.5);
+  vec4 colour = texture(u_image, texel / u_image_texels.zw);
+#ifdef ADJUST
+  vec3 plain = colour.rgb / max(colour.a, 1.0 / 255.0);
+  colour.rgb = clamp(pow(plain, vec3(u_adjust.y)) * u_adjust.z, 0.0, 1.0) * colour.a;
+#endif
+  o_colour = colour * u_adjust.x;
+}

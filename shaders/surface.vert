@@ -1,0 +1,82 @@
+// A tile of the surface: exaggeration, morph and skirt, light and air at each vertex.
+layout(location = 0) in vec3 a_base;       // see surface::TileVertex
+layout(location = 1) in vec3 a_up_offset;
+layout(location = 2) in vec2 a_heights;    // own, parent's
+layout(location = 3) in vec2 a_st;
+layout(location = 4) in float a_skirt;
+
+// 0: origin - eye, upper part; reference height   1: origin - eye, lower part; morph
+// 2: normal at the origin; skirt depth            3: tangent of the slope map; level
+// 4: colour slot's scale, offset, layer           5: slope slot's likewise
+// 6: the slot that it fades from, likewise        7: fade
+uniform vec4 u_tile[8];
+
+out vec2 v_colour_uv;
+#ifdef FADE
+out vec2 v_before_uv;
+#endif
+#ifdef BORDERS
+out vec2 v_st;
+#endif
+#ifdef LIGHT
+out vec2 v_slope_uv;
+out vec3 v_sun;           // direction to the sun along the slope map's tangents and up
+out vec3 v_sunlight;
+out vec3 v_ambient;
+#endif
+#ifdef ATMOSPHERE
+out vec3 v_air_light;
+out vec3 v_air_through;
+#endif
+
+void main() {
+  float exaggeration = sun.w;
+  vec3 up = u_tile[2].xyz + a_up_offset;
+  float height = mix(a_heights.y, a_heights.x, u_tile[1].w);
+  vec3 displaced = exaggeration * (u_tile[0].w * a_up_offset + height * up);
+  if (a_skirt > 0.0) {
+    vec3 outward = a_base - up * dot(a_base, up);
+    displaced -= u_tile[2].w * a_skirt * (up - 0.05 * normalize(outward));
+  }
+  // Near the eye the first sum is exact, so a moving eye does not make vertices jitter.
+  vec3 relative = (a_base + u_tile[0].xyz) + u_tile[1].xyz + displaced;
+  gl_Position = clip_from_relative * vec4(relative, 1.0);
+
+#ifdef WIREFRAME
+  gl_Position.z -= gl_Position.w * u_tile[7].y;  // a little nearer than the surface
+#endif
+  v_colour_uv = a_st * u_tile[4].x + u_tile[4].yz;
+#ifdef FADE
+  v_before_uv = a_st * u_tile[6].x + u_tile[6].yz;
+#endif
+#ifdef BORDERS
+  v_st = a_st;
+#endif
+
+#ifdef ATMOSPHERE
+  vec3 from_eye = relative * air_scale.xyz;
+  float distance_in_air = length(from_eye);
+  vec3 direction = from_eye / max(distance_in_air, 1e-12);
+  vec3 place = air_eye.xyz + from_eye;
+  float enters = min(within_atmosphere(direction).x, distance_in_air);
+  scatter(direction, enters, distance_in_air, enters > 0.0 ? -0.9 : -0.3, 5, v_air_light, v_air_through);
+#endif
+
+#ifdef LIGHT
+  v_slope_uv = a_st * u_tile[5].x + u_tile[5].yz;
+  vec3 tangent_u = normalize(u_tile[3].xyz - up * dot(u_tile[3].xyz, up));
+  vec3 tangent_v = cross(tangent_u, up);
+  v_sun = vec3(dot(sun.xyz, tangent_u), dot(sun.xyz, tangent_v), dot(sun.xyz, up));
+  // The sun's disc sinks behind the horizon, and twilight follows it.
+  float day = smoothstep(-0.03, 0.05, v_sun.z);
+  float sky = smoothstep(-0.18, 0.25, v_sun.z);
+  v_sunlight = vec3(0.85 * day);
+  v_ambient = vec3(mix(0.025, 0.25, sky));
+#ifdef ATMOSPHERE
+  // Relative to a high sun, under which pictures of the ground were taken.
+  vec3 colour = sunlight_at(place) * exp((air_scatter.rgb + air_scatter.w) * air_scale.w);
+  v_sunlight *= min(colour, vec3(1.0));
+  v_ambient *= mix(vec3(0.85, 0.95, 1.2), vec3(1.0), sky);
+#endif
+#endif
+}

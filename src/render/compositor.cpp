@@ -1,0 +1,187 @@
+#include "render/compositor.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+
+#include <epoxy/gl.h>
+
+#include "render/pass_source.h"
+
+namespace tellurion::render {
+namespace {
+
+using surface::ImagePatch;
+
+constexpr std::uint32_t kAdjust = 1;  // feature bit
+constexpr std::size_t kMaxScratch = 8;
+enum Uniform { u_slot_range, u_cells, u_image_texels, u_adjust };
+
+constexpr float kSide = surface::kColourSlotSide;
+constexpr float kGutter = surface::kColourGutter;
+
+/// Tile coordinates -> clip coordinates of the slot.
+float to_clip(float st) { return 2.0f * (kGutter + st * (kSide - 2.0f * kGutter)) / kSide - 1.0f; }
+
+/// Whether nothing below the patch can be seen.
+bool hides_all(const ImagePatch& p) {
+  constexpr float kEdge = 1.0f - 1e-3f / kSide;
+  return p.opaque && p.opacity >= 1.0f && to_clip(p.lower.x) <= -kEdge && to_clip(p.lower.y) <= -kEdge &&
+         to_clip(p.upper.x) >= kEdge && to_clip(p.upper.y) >= kEdge;
+}
+
+int size_class(int size) { return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(size, 64)))); }
+
+}  // namespace
+
+Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
+  gpu::ProgramFamily programs({shader_texts({"compose.vert"}),
+                               shader_texts({"compose.frag"}),
+                               {"ADJUST"},
+                               {"u_slot_range", "u_cells", "u_image_texels", "u_adjust"},
+                               {"u_image"},
+                               {}});
+  for (const std::uint32_t features : {0u, kAdjust}) {
+    const auto program = programs.variant(thread, features);
+    if (!program) return program.error();
+  }
+  return Compositor(thread, std::move(programs));
+}
+
+Compositor::Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs)
+    : programs_(std::move(programs)), array_(thread), cells_(thread), target_(thread), source_(thread) {
+  scratch_.reserve(kMaxScratch + 1);
+  glBindVertexArray(array_.name());
+  glBindBuffer(GL_ARRAY_BUFFER, cells_.name());
+  for (GLuint location = 0; location < 2; ++location) {
+    glEnableVertexAttribArray(location);
+    glVertexAttribPointer(location, 4, GL_FLOAT, GL_FALSE, 8 * sizeof(float),
+                          reinterpret_cast<const void*>(location * 4 * sizeof(float)));
+    glVertexAttribDivisor(location, 1);
+  }
+  glBindVertexArray(0);
+}
+
+Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const ImagePatch> patches, const SlotPool& pool,
+                                 Slot slot, Budget& budget) {
+  glBindFramebuffer(GL_FRAMEBUFFER, target_.name());
+  glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, pool.texture(slot), 0, static_cast<GLint>(slot.layer));
+  glViewport(0, 0, pool.format().side, pool.format().side);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_SCISSOR_TEST);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+
+  const auto top = std::find_if(patches.rbegin(), patches.rend(), hides_all);
+  const auto first = top == patches.rend() ? patches.begin() : std::prev(top.base());
+  if (top == patches.rend()) {
+    glClearColor(0, 0, 0, 0);
+    glClear(GL_COLOR_BUFFER_BIT);
+  }
+  for (auto patch = first; patch != patches.end(); ++patch) {
+    if (auto drawn = draw(thread, *patch, budget); !drawn) return drawn;
+  }
+  glDisable(GL_BLEND);
+  make_levels(pool, slot);
+  return {};
+}
+
+Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch, Budget& budget) {
+  assert(patch.columns > 0 && patch.rows > 0 && patch.image.width > 0 && patch.image.height > 0);
+  const bool adjusts = patch.gamma != 1.0f || patch.multiplier != 1.0f;
+  const auto program = programs_.variant(thread, adjusts ? kAdjust : 0u);
+  if (!program) return program.error();
+
+  const Scratch& scratch = scratch_for(thread, patch.image, budget);
+  const GLint filter = patch.linear ? GL_LINEAR : GL_NEAREST;
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, patch.image.width, patch.image.height, GL_RGBA, GL_UNSIGNED_BYTE,
+                  patch.image.rgba.data());
+  upload_cells(patch);
+
+  const auto& locations = (*program)->locations;
+  glUseProgram((*program)->program.name());
+  glUniform4f(locations[u_slot_range], to_clip(patch.lower.x), to_clip(patch.lower.y), to_clip(patch.upper.x),
+              to_clip(patch.upper.y));
+  glUniform2i(locations[u_cells], patch.columns, patch.rows);
+  glUniform4f(locations[u_image_texels], static_cast<float>(patch.image.width), static_cast<float>(patch.image.height),
+              static_cast<float>(scratch.width), static_cast<float>(scratch.height));
+  glUniform3f(locations[u_adjust], patch.opacity, patch.gamma, patch.multiplier);
+  if (patch.opaque && patch.opacity >= 1.0f) {
+    glDisable(GL_BLEND);
+  } else {
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  }
+  glBindVertexArray(array_.name());
+  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, patch.columns * patch.rows);
+  glBindVertexArray(0);
+  return {};
+}
+
+Compositor::Scratch& Compositor::scratch_for(gpu::RenderThread& thread, const raster::Image& image, Budget& budget) {
+  const int width = size_class(image.width);
+  const int height = size_class(image.height);
+  glActiveTexture(GL_TEXTURE0);
+  ++use_;
+  for (Scratch& s : scratch_) {
+    if (s.width != width || s.height != height) continue;
+    s.last_use = use_;
+    glBindTexture(GL_TEXTURE_2D, s.texture.name());
+    return s;
+  }
+  if (scratch_.size() == kMaxScratch) {
+    const auto oldest = std::min_element(scratch_.begin(), scratch_.end(),
+                                         [](const Scratch& a, const Scratch& b) { return a.last_use < b.last_use; });
+    budget.used -= oldest->bytes();
+    scratch_.erase(oldest);
+  }
+  Scratch& s = scratch_.emplace_back(Scratch{width, height, use_, gpu::Texture(thread)});
+  budget.used += s.bytes();
+  glBindTexture(GL_TEXTURE_2D, s.texture.name());
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  return s;
+}
+
+void Compositor::upload_cells(const ImagePatch& patch) {
+  const auto columns = static_cast<std::size_t>(patch.columns);
+  const auto rows = static_cast<std::size_t>(patch.rows);
+  assert(patch.image_points.size() == (columns + 1) * (rows + 1));
+  cell_points_.clear();
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column) {
+      for (std::size_t corner = 0; corner < 4; ++corner) {
+        const glm::vec2 point = patch.image_points[(row + corner / 2) * (columns + 1) + column + corner % 2];
+        cell_points_.push_back(point.x);
+        cell_points_.push_back(point.y);
+      }
+    }
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, cells_.name());
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(cell_points_.size() * sizeof(float)), cell_points_.data(),
+               GL_STREAM_DRAW);
+}
+
+void Compositor::make_levels(const SlotPool& pool, Slot slot) {
+  // A chain of blits: glGenerateMipmap would make the levels of the whole array.
+  const unsigned texture = pool.texture(slot);
+  const auto layer = static_cast<GLint>(slot.layer);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, source_.name());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_.name());
+  for (int level = 1; level < pool.format().levels; ++level) {
+    const int from = pool.format().side >> (level - 1);
+    const int to = pool.format().side >> level;
+    glFramebufferTextureLayer(GL_READ_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, texture, level - 1, layer);
+    glFramebufferTextureLayer(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, texture, level, layer);
+    glBlitFramebuffer(0, 0, from, from, 0, 0, to, to, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+}
+
+}  // namespace tellurion::render

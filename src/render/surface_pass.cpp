@@ -1,0 +1,170 @@
+#include "render/surface_pass.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <epoxy/gl.h>
+
+#include "render/pass_source.h"
+
+namespace tellurion::render {
+namespace {
+
+using surface::DrawTile;
+
+constexpr int kTileVectors = 8;  // u_tile of shaders/surface.vert
+constexpr float kLineBias = 1e-5f;
+
+/// Scale and offset from the tile coordinates of `tile` to texture coordinates of the slot of `owner`.
+glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int side, int gutter, float layer) {
+  const int levels = tile.level - owner.level;
+  const double part = std::ldexp(1.0, -levels);  // of the owner's side
+  const double inner = static_cast<double>(side - 2 * gutter) / side;
+  const double edge = static_cast<double>(gutter) / side;
+  const auto first_x = static_cast<std::int64_t>(owner.x) << levels;
+  const auto first_y = static_cast<std::int64_t>(owner.y) << levels;
+  return {part * inner, edge + inner * part * static_cast<double>(tile.x - first_x),
+          edge + inner * part * static_cast<double>(tile.y - first_y), layer};
+}
+
+struct TileUniforms {
+  glm::vec4 v[kTileVectors];
+};
+
+gpu::ProgramSource surface_source() {
+  return {shader_texts({"frame.glsl", "atmosphere.glsl", "surface.vert"}),
+          shader_texts({"frame.glsl", "surface.frag"}),
+          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH"},
+          {"u_tile"},
+          {"u_colour", "u_slope", "u_before"},
+          {"Frame"}};
+}
+
+gpu::ProgramSource box_source() {
+  return {shader_texts({"frame.glsl", "box.vert"}), shader_texts({"box.frag"}), {"LOG_DEPTH"}, {"u_box"}, {}, {"Frame"}};
+}
+
+}  // namespace
+
+SurfacePass::SurfacePass(gpu::RenderThread& thread)
+    : programs_(surface_source()),
+      box_programs_(box_source()),
+      box_array_(thread),
+      box_edges_(thread),
+      colour_sampler_(thread) {
+  constexpr std::uint8_t kEdges[24] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 2, 1, 3, 4, 6, 5, 7, 0, 4, 1, 5, 2, 6, 3, 7};
+  glBindVertexArray(box_array_.name());
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, box_edges_.name());
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, sizeof kEdges, kEdges, GL_STATIC_DRAW);
+  glBindVertexArray(0);
+  const unsigned sampler = colour_sampler_.name();
+  glSamplerParameteri(sampler, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glSamplerParameteri(sampler, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+}
+
+Result<void> SurfacePass::prepare(gpu::RenderThread& thread, std::uint32_t features) {
+  const auto program = programs_.variant(thread, features);
+  if (!program) return program.error();
+  return {};
+}
+
+void SurfacePass::set_anisotropy(const gpu::RenderThread& thread, double anisotropy) {
+  const auto& capabilities = thread.capabilities();
+  if (!capabilities.anisotropic_filter) return;
+  const float wanted = std::clamp(static_cast<float>(anisotropy), 1.0f, capabilities.max_anisotropy);
+  if (wanted == anisotropy_) return;
+  glSamplerParameterf(colour_sampler_.name(), GL_TEXTURE_MAX_ANISOTROPY_EXT, wanted);
+  anisotropy_ = wanted;
+}
+
+void SurfacePass::bind(unsigned unit, unsigned texture) {
+  if (bound_[unit] == texture) return;
+  glActiveTexture(GL_TEXTURE0 + unit);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, texture);
+  bound_[unit] = texture;
+}
+
+FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration,
+                               std::uint32_t features, std::span<const DrawTile> tiles, const TileStore& store) {
+  const auto plain = programs_.variant(thread, features);
+  const auto fading = features & (measure | wireframe) ? plain : programs_.variant(thread, features | fade);
+  if (!plain || !fading) return {};
+
+  glBindSampler(0, colour_sampler_.name());
+  glBindSampler(1, 0);
+  glBindSampler(2, colour_sampler_.name());
+  std::fill(std::begin(bound_), std::end(bound_), 0u);
+
+  FrameFigures figures;
+  const gpu::LinkedProgram* in_use = nullptr;
+  for (const DrawTile& tile : tiles) {
+    const ResidentTile* resident = store.find(tile.key);
+    if (!resident || !resident->mesh) continue;
+    ResidentMesh& mesh = *resident->mesh;
+
+    const bool fades = tile.fade < 1.0f && tile.colour_before != tile.colour_owner;
+    const gpu::LinkedProgram* program = fades ? *fading : *plain;
+    if (program != in_use) {
+      glUseProgram(program->program.name());
+      in_use = program;
+    }
+
+    const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
+    const glm::vec3 upper(offset);
+    const glm::vec3 lower(offset - glm::dvec3(upper));
+    const auto colour_owner = tile.colour_owner == tile.key ? resident : store.find(tile.colour_owner);
+    const auto slope_owner = tile.slope_owner == tile.key ? resident : store.find(tile.slope_owner);
+    const auto colour = store.colour_of(colour_owner);
+    const auto slopes = store.slopes_of(slope_owner);
+    TileUniforms u;
+    u.v[0] = glm::vec4(upper, mesh.reference_height());
+    u.v[1] = glm::vec4(lower, tile.morph);
+    u.v[2] = glm::vec4(glm::vec3(mesh.origin_up()), tile.skirt_depth);
+    u.v[3] = glm::vec4(glm::vec3(slope_owner ? slope_owner->tangent : resident->tangent), tile.key.level);
+    u.v[4] = slot_place(tile.key, tile.colour_owner, surface::kColourSlotSide, surface::kColourGutter, colour.layer);
+    u.v[5] = slot_place(tile.key, tile.slope_owner, surface::kSlopeSlotSide, surface::kSlopeGutter, slopes.layer);
+    u.v[6] = u.v[4];
+    u.v[7] = glm::vec4(tile.fade, kLineBias, 0, 0);
+    bind(0, colour.texture);
+    bind(1, slopes.texture);
+    if (fades) {
+      const auto before = store.colour_of(store.find(tile.colour_before));
+      u.v[6] = slot_place(tile.key, tile.colour_before, surface::kColourSlotSide, surface::kColourGutter, before.layer);
+      bind(2, before.texture);
+    }
+    glUniform4fv(program->locations[0], kTileVectors, &u.v[0].x);
+
+    if (features & wireframe) {
+      mesh.draw_lines(thread);
+    } else {
+      mesh.draw_triangles();
+      figures.triangles += mesh.index_count() / 3;
+    }
+    ++figures.draws;
+  }
+  glBindVertexArray(0);
+  for (GLuint unit = 0; unit < 3; ++unit) glBindSampler(unit, 0);
+  return figures;
+}
+
+void SurfacePass::draw_boxes(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration,
+                             std::uint32_t features, std::span<const DrawTile> tiles, const TileStore& store) {
+  const auto program = box_programs_.variant(thread, features & log_depth ? 1u : 0u);
+  if (!program) return;
+  glUseProgram((*program)->program.name());
+  glBindVertexArray(box_array_.name());
+  for (const DrawTile& tile : tiles) {
+    const ResidentTile* resident = store.find(tile.key);
+    if (!resident || !resident->mesh) continue;
+    const auto box = resident->mesh->box(exaggeration);
+    glm::vec4 u[4] = {glm::vec4(box.corner - camera.eye.xyz, 0.0)};
+    for (int axis = 0; axis < 3; ++axis) u[axis + 1] = glm::vec4(box.edges[axis], 0.0);
+    glUniform4fv((*program)->locations[0], 4, &u[0].x);
+    glDrawElements(GL_LINES, 24, GL_UNSIGNED_BYTE, nullptr);
+  }
+  glBindVertexArray(0);
+}
+
+}  // namespace tellurion::render

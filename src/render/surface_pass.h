@@ -1,0 +1,50 @@
+// Draws the tiles of a cut: shaded, as lines, as boxes, or measured.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <glm/vec4.hpp>
+
+#include "base/result.h"
+#include "gpu/program.h"
+#include "render/renderer.h"
+#include "render/tile_store.h"
+#include "surface/draw_list.h"
+#include "view/camera.h"
+
+namespace tellurion::render {
+
+class SurfacePass {
+ public:
+  /// What a variant of the surface's program does; bits of its features.
+  enum Feature : std::uint32_t { light = 1, atmosphere = 2, fade = 4, borders = 8, wireframe = 16, measure = 32, log_depth = 64 };
+
+  explicit SurfacePass(gpu::RenderThread& thread);
+
+  /// Compiles the variant. Errors: internal.
+  Result<void> prepare(gpu::RenderThread& thread, std::uint32_t features);
+
+  /// The frame's block must be bound and depth be set up.
+  FrameFigures draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, std::uint32_t features,
+                    std::span<const surface::DrawTile> tiles, const TileStore& store);
+  void draw_boxes(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, std::uint32_t features,
+                  std::span<const surface::DrawTile> tiles, const TileStore& store);
+
+  void set_anisotropy(const gpu::RenderThread& thread, double anisotropy);
+
+ private:
+  /// Binds a texture array unless it is bound.
+  void bind(unsigned unit, unsigned texture);
+
+  gpu::ProgramFamily programs_;
+  gpu::ProgramFamily box_programs_;
+  gpu::VertexArray box_array_;
+  gpu::Buffer box_edges_;
+  gpu::Sampler colour_sampler_;
+  float anisotropy_ = 1.0f;
+  unsigned bound_[3] = {};
+};
+
+}  // namespace tellurion::render
