@@ -13,6 +13,8 @@ namespace {
 /// Blocks that a raster keeps hold of beside the cache: two megabytes of heights.
 constexpr std::size_t kHeldBlocks = 8;
 
+constexpr double kFarthestPixel = 1e9;  ///< what lies farther away is a mistake; nearer ones fit into an int
+
 /// 1 inside [0, size], falling to 0 across one pixel on either side.
 double ramp(double x, double size) { return std::clamp(1.0 + std::min(x, size - x), 0.0, 1.0); }
 
@@ -23,6 +25,22 @@ int wrapped(int i, int size) {
 
 /// Column or row of the sample that stands for `i`: itself, the one round the body, or the outermost one.
 int real_index(int i, int size, bool wraps) { return wraps ? wrapped(i, size) : std::clamp(i, 0, size - 1); }
+
+/// The mean of the valid samples (upper left, upper right, lower left, lower right) by their bilinear weights.
+HeightSample interpolate(const std::array<float, 4>& samples, double tx, double ty, double reach) {
+  const std::array<double, 4> weights{(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * static_cast<double>(samples[i]);
+  if (!std::isnan(sum)) return {sum, reach};
+  sum = 0.0;
+  double valid = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (std::isnan(samples[i])) continue;
+    sum += weights[i] * static_cast<double>(samples[i]);
+    valid += weights[i];
+  }
+  return valid > 0.0 ? HeightSample{sum / valid, valid * reach} : HeightSample{};
+}
 
 }  // namespace
 
@@ -42,8 +60,8 @@ Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int colu
   const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
   const auto found = std::find_if(held_.begin(), held_.end(), [&](const Held& held) { return held.key == key; });
   if (found != held_.end()) {
-    if (found != held_.begin()) std::swap(*found, *std::prev(found));  // what is used often moves to the front
-    return std::find_if(held_.begin(), held_.end(), [&](const Held& held) { return held.key == key; })->block.get();
+    std::rotate(held_.begin(), found, std::next(found));  // the most recently used first
+    return held_.front().block.get();
   }
   const auto decode = [&]() -> Result<raster::HeightGrid> {
     const source::LevelSize& size = description().levels[static_cast<std::size_t>(level)];
@@ -53,83 +71,65 @@ Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int colu
   };
   Result<Frozen<raster::HeightGrid>> block = cache_->heights(key, std::cref(decode));
   if (!block) return block.error();
-  if (held_.size() < kHeldBlocks) {
-    held_.push_back({key, std::move(block).value()});
-  } else {
-    held_.back() = {key, std::move(block).value()};
-  }
-  return held_.back().block.get();
+  if (held_.size() == kHeldBlocks) held_.pop_back();
+  held_.insert(held_.begin(), Held{key, std::move(block).value()});
+  return held_.front().block.get();
 }
 
 Result<void> CachedRaster::sample_heights(int level, std::span<const glm::dvec2> pixels, std::span<HeightSample> heights) {
   assert(pixels.size() == heights.size());
-  const source::RasterDescription& about = description();
-  const source::LevelSize size = about.levels[static_cast<std::size_t>(level)];
-  const glm::dvec2 scale = source::level_scale(about, level);
-  const raster::HeightGrid* block = nullptr;
-  int block_column = -1;
-  int block_row = -1;
-
+  const glm::dvec2 scale = source::level_scale(description(), level);
+  BlockView view;
   for (std::size_t n = 0; n < pixels.size(); ++n) {
     const glm::dvec2 pixel = pixels[n] * scale;
-    heights[n] = HeightSample{};
-    double reach = ramp(pixel.y, size.height);
-    if (!about.wraps) reach *= ramp(pixel.x, size.width);
-    if (!(reach > 0.0) || !std::isfinite(pixel.x)) continue;
-
-    const double left = std::floor(pixel.x - 0.5);
-    const double top = std::floor(pixel.y - 0.5);
-    const double tx = pixel.x - 0.5 - left;
-    const double ty = pixel.y - 0.5 - top;
-    const std::array<double, 4> weights{(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
-    std::array<float, 4> samples;
-
-    const int x = static_cast<int>(about.wraps ? left - std::floor(left / size.width) * size.width : left);
-    const int y = static_cast<int>(top);
-    const int column = x / kBlockSide;
-    const int row = y / kBlockSide;
-    const int inner_x = x - column * kBlockSide;
-    const int inner_y = y - row * kBlockSide;
-    const bool same = block != nullptr && column == block_column && row == block_row;
-    if (same && inner_x >= 0 && inner_y >= 0 && inner_x + 1 < block->width && inner_y + 1 < block->height) {
-      const float* upper = &block->metres[static_cast<std::size_t>(inner_y) * static_cast<std::size_t>(block->width) +
-                                          static_cast<std::size_t>(inner_x)];
-      samples = {upper[0], upper[1], upper[block->width], upper[block->width + 1]};
-    } else {
-      for (int corner = 0; corner < 4; ++corner) {
-        const int sample_x = real_index(x + (corner & 1), size.width, about.wraps);
-        const int sample_y = real_index(y + (corner >> 1), size.height, false);
-        const int wanted_column = sample_x / kBlockSide;
-        const int wanted_row = sample_y / kBlockSide;
-        if (block == nullptr || wanted_column != block_column || wanted_row != block_row) {
-          Result<const raster::HeightGrid*> next = height_block(level, wanted_column, wanted_row);
-          if (!next) return next.error();
-          block = next.value();
-          block_column = wanted_column;
-          block_row = wanted_row;
-        }
-        samples[static_cast<std::size_t>(corner)] =
-            block->at(sample_x - wanted_column * kBlockSide, sample_y - wanted_row * kBlockSide);
-      }
+    const glm::dvec2 inner = pixel - view.first_centre;
+    if (inner.x >= 0.0 && inner.x < view.last_cell.x && inner.y >= 0.0 && inner.y < view.last_cell.y) {  // false for NaN
+      const int x = static_cast<int>(inner.x);
+      const int y = static_cast<int>(inner.y);
+      const float* upper = view.samples + (static_cast<std::ptrdiff_t>(y) * view.width + x);
+      const float* lower = upper + view.width;
+      heights[n] = interpolate({upper[0], upper[1], lower[0], lower[1]}, inner.x - x, inner.y - y, 1.0);
+      continue;
     }
-
-    double sum = 0.0;
-    double valid = 0.0;
-    for (std::size_t corner = 0; corner < 4; ++corner) {
-      if (samples[corner] != samples[corner]) continue;
-      sum += weights[corner] * static_cast<double>(samples[corner]);
-      valid += weights[corner];
-    }
-    if (valid > 0.0) heights[n] = {sum / valid, valid * reach};
+    Result<HeightSample> height = sample_anywhere(level, pixel, view);
+    if (!height) return height.error();
+    heights[n] = height.value();
   }
   return {};
+}
+
+/// Where samples come from several blocks, or from none. `view` becomes the block of the last sample.
+Result<HeightSample> CachedRaster::sample_anywhere(int level, glm::dvec2 pixel, BlockView& view) {
+  const source::LevelSize size = description().levels[static_cast<std::size_t>(level)];
+  const bool wraps = description().wraps;
+  const double reach = ramp(pixel.y, size.height) * (wraps ? 1.0 : ramp(pixel.x, size.width));
+  if (!(reach > 0.0) || !(std::abs(pixel.x) < kFarthestPixel)) return HeightSample{};
+
+  const glm::dvec2 corner = glm::floor(pixel - 0.5);
+  const glm::dvec2 t = pixel - 0.5 - corner;
+  std::array<float, 4> samples;
+  for (int i = 0; i < 4; ++i) {
+    const int x = real_index(static_cast<int>(corner.x) + (i & 1), size.width, wraps);
+    const int y = real_index(static_cast<int>(corner.y) + (i >> 1), size.height, false);
+    const int column = x / kBlockSide;
+    const int row = y / kBlockSide;
+    if (view.samples == nullptr || view.column != column || view.row != row) {
+      Result<const raster::HeightGrid*> block = height_block(level, column, row);
+      if (!block) return block.error();
+      view = BlockView{block.value()->metres.data(), block.value()->width, column, row,
+                       glm::dvec2(column, row) * static_cast<double>(kBlockSide) + 0.5,
+                       glm::dvec2(block.value()->width - 1, block.value()->height - 1)};
+    }
+    samples[static_cast<std::size_t>(i)] = view.samples[(y - row * kBlockSide) * view.width + (x - column * kBlockSide)];
+  }
+  return interpolate(samples, t.x, t.y, reach);
 }
 
 Result<HeightSample> CachedRaster::nearest_height(glm::dvec2 pixel) {
   const source::LevelSize size = description().levels.front();
   const bool wraps = description().wraps;
   const glm::dvec2 cell = glm::floor(pixel);
-  const bool inside = cell.y >= 0.0 && cell.y < size.height && std::isfinite(cell.x) &&
+  const bool inside = cell.y >= 0.0 && cell.y < size.height && std::abs(cell.x) < kFarthestPixel &&
                       (wraps || (cell.x >= 0.0 && cell.x < size.width));
   if (!inside) return HeightSample{};
   const int x = static_cast<int>(wraps ? cell.x - std::floor(cell.x / size.width) * size.width : cell.x);

@@ -41,7 +41,17 @@ class CachedRaster {
 
  private:
   CachedRaster() = default;
+  /// The block that sampling is in: cells between the centres of its samples need no other.
+  struct BlockView {
+    const float* samples = nullptr;
+    int width = 0;
+    int column = 0;
+    int row = 0;
+    glm::dvec2 first_centre{0.0};
+    glm::dvec2 last_cell{0.0};  ///< from `first_centre`
+  };
   Result<const raster::HeightGrid*> height_block(int level, int column, int row);
+  Result<HeightSample> sample_anywhere(int level, glm::dvec2 pixel, BlockView& view);
 
   const source::RasterSource* source_ = nullptr;
   std::unique_ptr<source::RasterReader> reader_;

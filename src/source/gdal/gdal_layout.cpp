@@ -149,16 +149,16 @@ SampleKind guess_kind(GDALDataset& dataset) {
   return type == GDT_Byte || type == GDT_UInt16 ? SampleKind::grey : SampleKind::height;
 }
 
-HeightPlan plan_heights(GDALRasterBand& band, const GdalOptions& options, const geo::Ellipsoid& ellipsoid, bool unit_is_the_datums) {
+HeightPlan plan_heights(GDALRasterBand& band, const GdalOptions& options, const geo::Ellipsoid& world) {
   HeightPlan plan;
   plan.no_data = no_data_of(band, options);
   plan.int16_voids = !plan.no_data && band.GetRasterDataType() == GDT_Int16;
-  const double unit = options.scale || unit_is_the_datums ? 1.0 : unit_of(band).value_or(1.0);
-  plan.scale = options.scale.value_or(band.GetScale()) * unit;
-  plan.offset = options.offset.value_or(band.GetOffset()) * unit;
+  plan.unit = options.scale ? 1.0 : unit_of(band).value_or(1.0);
+  plan.scale = options.scale.value_or(band.GetScale());
+  plan.offset = options.offset.value_or(band.GetOffset());
   // Planetary grids may give distances from the body's centre.
-  if (std::abs(plan.offset - ellipsoid.a()) < 0.02 * ellipsoid.a()) plan.offset -= ellipsoid.a();
-  plan.limit_metres = std::max(0.015 * ellipsoid.a(), 30'000.0);
+  if (std::abs(plan.offset * plan.unit - world.a()) < 0.02 * world.a()) plan.offset -= world.a() / plan.unit;
+  plan.limit_metres = std::max(0.015 * world.a(), 30'000.0);
   return plan;
 }
 
@@ -286,7 +286,7 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   if (static_cast<double>(layout.georeference.width) * layout.georeference.height > kManySamples && about.levels.size() > 1 && layout.levels[1].overview < 0) {
     about.hints.push_back(fmt::format("{} is large and has no overviews, which makes it slow from afar: run gdaladdo on it once.", options.path));
   }
-  layout.heights = plan_heights(*dataset.GetRasterBand(1), options, world, false);
+  layout.heights = plan_heights(*dataset.GetRasterBand(1), options, world);
   return layout;
 }
 

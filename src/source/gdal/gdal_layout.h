@@ -26,8 +26,9 @@ struct LevelPlan {
 struct HeightPlan {
   std::optional<double> no_data;
   bool int16_voids = false;   ///< no value is declared: -32768 and -32767 are taken as voids
-  double scale = 1.0;         ///< metres = sample * scale + offset
+  double scale = 1.0;         ///< metres = (sample * scale + offset) * unit
   double offset = 0.0;
+  double unit = 1.0;
   double limit_metres = 0.0;  ///< what is higher or deeper is no data
 };
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "raster/box_average.h"
+#include "source/proj/undulation_field.h"
 
 namespace tellurion::source {
 namespace {
@@ -73,7 +74,7 @@ Result<raster::HeightGrid> GdalReader::heights_of_overview(int overview, const P
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const double sample = samples[i];
     if (sample == no_data || (plan.int16_voids && sample <= -32767.0) || (!mask.empty() && mask[i] == 0.0)) continue;
-    const double metres = sample * plan.scale + plan.offset;
+    const double metres = (sample * plan.scale + plan.offset) * plan.unit;
     if (std::abs(metres) <= plan.limit_metres) grid.metres[i] = static_cast<float>(metres);
   }
   return grid;
@@ -107,21 +108,20 @@ Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Re
   }
 }
 
-/// Adds the undulation at every sample.
 void GdalReader::raise_to_ellipsoid(raster::HeightGrid& grid, int level, const PixelWindow& window) {
   const glm::dvec2 scale = level_scale(layout_->description, level);
-  std::vector<glm::dvec2> pixels;
-  pixels.reserve(area(window));
-  for (int y = 0; y < window.height; ++y) {
-    for (int x = 0; x < window.width; ++x) pixels.push_back(glm::dvec2(window.x + x + 0.5, window.y + y + 0.5) / scale);
-  }
-  std::vector<geo::LatLon> places(pixels.size());
-  mapping_.to_places(pixels, places);
-  std::vector<double> undulations(pixels.size());
-  datum_->undulations(places, undulations);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    grid.metres[i] = static_cast<float>(static_cast<double>(grid.metres[i]) * datum_->slope() + undulations[i]);
-  }
+  const Metres spacing = layout_->description.spacing / std::min(scale.x, scale.y);
+  const UndulationsAt at = [&](std::span<const glm::ivec2> samples, std::span<double> metres) {
+    std::vector<glm::dvec2> pixels;
+    pixels.reserve(samples.size());
+    for (const glm::ivec2& sample : samples) pixels.push_back(glm::dvec2(window.x + sample.x + 0.5, window.y + sample.y + 0.5) / scale);
+    std::vector<geo::LatLon> places(pixels.size());
+    mapping_.to_places(pixels, places);
+    datum_->undulations(places, metres);
+  };
+  const std::vector<float> undulations = undulation_field({window.width, window.height}, spacing, at);
+  const auto slope = static_cast<float>(datum_->slope());
+  for (std::size_t i = 0; i < undulations.size(); ++i) grid.metres[i] = grid.metres[i] * slope + undulations[i];
 }
 
 Result<raster::HeightGrid> GdalReader::read_heights(int level, const PixelWindow& window) {

@@ -55,6 +55,7 @@ Result<void> choose_vertical(GdalLayout& layout, const CrsFacts& facts) {
   }
   Result<VerticalDatum> datum = VerticalDatum::create(wanted);
   if (!datum) return datum.error();
+  if (std::abs(datum->slope()) != 1.0) layout.heights.unit = 1.0;  // the datum counts in the samples' unit already
   layout.vertical = wanted;
   about.vertical = options.vertical.value_or(facts.vertical);
   return {};

@@ -23,6 +23,9 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Bodies whose equatorial radii differ by more are different bodies.
 constexpr double kRadiusTolerance = 0.01;
 
+/// Geotransforms are written with few digits: so far beyond a pole is the pole (11 m on Earth).
+constexpr double kRoundingDegrees = 1e-4;
+
 enum class Method { geographic, web_mercator, proj };
 
 bool same_radius(double a, double b) { return std::abs(a - b) <= kRadiusTolerance * b; }
@@ -205,24 +208,21 @@ std::optional<double> Projection::period() const { return state_->period; }
 void Projection::to_places(std::span<const glm::dvec2> coordinates, std::span<geo::LatLon> places) {
   assert(coordinates.size() == places.size());
   const double k = state_->latitude_factor;
-  const auto world_latitude = [k](double latitude) { return k == 1.0 ? latitude : std::atan2(k * std::sin(latitude), std::cos(latitude)); };
-  const auto place = [](double latitude, double longitude) {
-    return geo::LatLon{Radians(latitude), Radians(longitude - 2.0 * kPi * std::round(longitude / (2.0 * kPi)))};
+  const auto place = [k](double north, double east) {
+    if (!(std::abs(north) <= 90.0 + kRoundingDegrees) || !std::isfinite(east)) return geo::LatLon{Radians(kNaN), Radians(kNaN)};
+    const double latitude = std::clamp(north, -90.0, 90.0) * kDegree;
+    const double turned = east - 360.0 * std::round(east / 360.0);
+    return geo::LatLon{Radians(k == 1.0 ? latitude : std::atan2(k * std::sin(latitude), std::cos(latitude))), Radians(turned * kDegree)};
   };
 
   if (state_->method == Method::geographic) {
-    constexpr double kBeyondPole = 90.0 + 1e-9;  // rounding of a file's geotransform
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const double degrees = coordinates[i].y;
-      const double latitude = std::abs(degrees) <= kBeyondPole ? std::clamp(degrees, -90.0, 90.0) * kDegree : kNaN;
-      places[i] = place(world_latitude(latitude), std::isnan(latitude) ? kNaN : coordinates[i].x * kDegree);
-    }
+    for (std::size_t i = 0; i < places.size(); ++i) places[i] = place(coordinates[i].y, coordinates[i].x);
     return;
   }
   if (state_->method == Method::web_mercator) {
     const double radius = geo::kWgs84.a();
     for (std::size_t i = 0; i < places.size(); ++i) {
-      places[i] = place(std::atan(std::sinh(coordinates[i].y / radius)), coordinates[i].x / radius);
+      places[i] = place(std::atan(std::sinh(coordinates[i].y / radius)) / kDegree, coordinates[i].x / radius / kDegree);
     }
     return;
   }
@@ -231,10 +231,7 @@ void Projection::to_places(std::span<const glm::dvec2> coordinates, std::span<ge
     proj_trans_generic(state_->operation.get(), PJ_INV, &degrees[0].x, sizeof(glm::dvec2), degrees.size(), &degrees[0].y,
                        sizeof(glm::dvec2), degrees.size(), nullptr, 0, 0, nullptr, 0, 0);
   }
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const bool valid = std::isfinite(degrees[i].x) && std::isfinite(degrees[i].y);
-    places[i] = valid ? place(world_latitude(degrees[i].y * kDegree), degrees[i].x * kDegree) : geo::LatLon{Radians(kNaN), Radians(kNaN)};
-  }
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = place(degrees[i].y, degrees[i].x);
 }
 
 void Projection::to_coordinates(std::span<const geo::LatLon> places, std::span<glm::dvec2> coordinates) {

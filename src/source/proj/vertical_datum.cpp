@@ -52,6 +52,15 @@ std::string missing_grids(PJ_CONTEXT* context, const PJ* crs, const PJ* target) 
   return names;
 }
 
+/// Metres up of one unit of the vertical CRS: negative where it counts depths.
+double slope_of(PJ_CONTEXT* context, const PJ* vertical) {
+  const PjPtr axes(proj_crs_get_coordinate_system(context, vertical));
+  const char* direction = nullptr;
+  double unit = 1.0;
+  if (!axes || !proj_cs_get_axis_info(context, axes.get(), 0, nullptr, nullptr, &direction, &unit, nullptr, nullptr, nullptr)) return 1.0;
+  return std::string(direction) == "down" ? -unit : unit;
+}
+
 }  // namespace
 
 struct VerticalDatum::State {
@@ -77,6 +86,7 @@ Result<VerticalDatum> VerticalDatum::create(const std::string& definition) {
                  fmt::format("\"{}\" is no vertical datum that PROJ knows; say \"ellipsoid\", \"egm96\" or a code like \"EPSG:5773\"", definition)};
   }
   state->name = proj_get_name(vertical.get());
+  state->slope = slope_of(ctx, vertical.get());
   const PjPtr horizontal(proj_create(ctx, "EPSG:4326"));
   const PjPtr target(proj_create(ctx, "EPSG:4979"));
   const std::string text = fmt::format("COMPOUNDCRS[\"heights\",{},{}]", proj_as_wkt(ctx, horizontal.get(), PJ_WKT2_2019, nullptr),
