@@ -374,6 +374,25 @@ TEST_CASE("eviction_candidate: never a tile of the last frame, never a root, chi
   CHECK(flight.tree.select(random_camera(planet.ellipsoid, random), settings, flight.now).draw.size() > 0);
 }
 
+TEST_CASE("eviction_candidate: a child that arrived after its parents goes before them") {
+  EvenPlanet planet;
+  Flight flight(planet);
+  const geo::TileKey key{3, 6, 20, 33};  // behind the body, where no frame looks
+  for (const int level : {2, 4, 6, 5}) {
+    flight.tree.arrived_geometry(geo::ancestor(key, level), planet.metrics_of(geo::ancestor(key, level)), false);
+  }
+  const view::Camera camera = camera_at(planet.ellipsoid, 0, 90, 1e6, 0, -90);
+  CHECK_FALSE(flight.tree.eviction_candidate(Part::geometry).has_value());  // a frame may still want it
+  for (int i = 0; i < 3; ++i) flight.tree.select(camera, SelectionSettings{}, flight.now);
+  for (const int level : {6, 5, 4, 2}) {
+    const auto candidate = flight.tree.eviction_candidate(Part::geometry);
+    REQUIRE(candidate.has_value());
+    CHECK(*candidate == geo::ancestor(key, level));
+    flight.tree.released(*candidate, Part::geometry);
+  }
+  CHECK_FALSE(flight.tree.eviction_candidate(Part::geometry).has_value());
+}
+
 TEST_CASE("select: frozen keeps the cut, culling included") {
   EvenPlanet planet;
   Flight flight(planet);
