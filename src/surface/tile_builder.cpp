@@ -153,8 +153,9 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
   geometry.metrics.height_error = static_cast<float>(field->error + decimated.height_deviation);
   geometry.metrics.curvature_error = static_cast<float>(decimated.curvature_deviation);
   const auto [lowest, highest] = std::minmax_element(field->heights.begin(), field->heights.end());
-  geometry.metrics.min_height = static_cast<float>(*lowest - field->error);
-  geometry.metrics.max_height = static_cast<float>(*highest + field->error);
+  // The drawn heights, and the true ones: as the facts have them or within the error of those drawn.
+  geometry.metrics.min_height = static_cast<float>(std::min(*lowest, std::max(*lowest - field->error, double{known.min_height})));
+  geometry.metrics.max_height = static_cast<float>(std::max(*highest, std::min(*highest + field->error, double{known.max_height})));
   if (known.own_slopes) {
     Result<SlopeMap> slopes = build_slopes(model, key, stop);
     if (!slopes) return slopes.error();

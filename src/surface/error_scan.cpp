@@ -1,0 +1,349 @@
+#include "surface/error_scan.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include <glm/common.hpp>
+
+#include "surface/rtin.h"
+#include "surface/tile_grid.h"
+
+namespace tellurion::surface {
+namespace {
+
+constexpr int kJobLevel = 2;
+constexpr int kJobsPerFace = 1 << (2 * kJobLevel);
+
+/// Samples are compared at their own places and half-way between; the true largest deviation lies a little above. The largest
+/// excess found over etopo5, SRTM and LOLA data, with a hundred random places a sample, was 0.03.
+constexpr double kBetweenSamples = 1.05;
+
+constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), 0.0f};
+
+void include(TileRecord& record, const TileRecord& part) {
+  record.min_height = std::min(record.min_height, part.min_height);
+  record.max_height = std::max(record.max_height, part.max_height);
+  record.error = std::max(record.error, part.error);
+}
+
+/// Whether the table ends with this tile.
+bool is_leaf(const SurfaceDescription& description, const geo::TileKey& key) {
+  return nominal_grid_spacing(description.ellipsoid, key.level) <= kFinestGridOfTable * finest_spacing(description.heights, key) ||
+         key.level >= geo::kMaxTileLevel;
+}
+
+/// A tile of the path from a root to the leaf being scanned, with its grid.
+struct OnPath {
+  geo::TileKey key;
+  geo::FaceRect rect;
+  std::vector<double> heights;
+  TileRecord record = kNothingYet;
+
+  /// Largest distance so far between the data and the grid.
+  void compare(glm::dvec2 uv, double metres) {
+    const glm::dvec2 grid = (uv - rect.lower) / (rect.upper - rect.lower) * static_cast<double>(kGridSide - 1);
+    const double shown = interpolate_in_triangles(heights, kGridSide, grid.x, grid.y);
+    worst = std::max(worst, std::abs(metres - shown));
+  }
+  double worst = 0.0;
+};
+
+/// A sample of a raster, seen from the face.
+struct FaceSample {
+  glm::dvec2 uv{NAN};
+  double metres = 0.0;
+  bool within = false;  ///< the leaf
+};
+
+class Scanner {
+ public:
+  Scanner(ElevationModel& model, std::stop_token stop) : model_(model), stop_(std::move(stop)) {}
+
+  Result<SubtreeScan> run(const geo::TileKey& root) {
+    SubtreeScan scan;
+    scan.root = root;
+    for (int level = 0; level < root.level; ++level) {
+      if (Result<void> pushed = push(geo::ancestor(root, level)); !pushed) return pushed.error();
+    }
+    if (Result<void> done = descend(root, scan.tree, 0); !done) return done.error();
+    for (OnPath& tile : path_) scan.above.push_back(finished(tile));
+    return scan;
+  }
+
+ private:
+  Result<void> push(const geo::TileKey& key) {
+    OnPath tile;
+    tile.key = key;
+    tile.rect = geo::face_rect(key);
+    const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kGridSide);
+    tile.heights.resize(normals.size());
+    const double spacing = nominal_grid_spacing(model_.description().ellipsoid, key.level);
+    if (Result<void> read = model_.heights(normals, spacing, tile.heights); !read) return read;
+    path_.push_back(std::move(tile));
+    return {};
+  }
+
+  Result<void> descend(const geo::TileKey& key, RecordTree& tree, std::size_t node) {
+    if (stop_.stop_requested()) return {ErrorCode::cancelled, "error table"};
+    if (Result<void> pushed = push(key); !pushed) return pushed;
+    if (is_leaf(model_.description(), key)) {
+      if (Result<void> scanned = scan_leaf(); !scanned) return scanned;
+    } else {
+      const std::size_t children = tree.add_children(node);
+      for (int i = 0; i < 4; ++i) {
+        const std::size_t child = children + static_cast<std::size_t>(i);
+        if (Result<void> done = descend(geo::child(key, i), tree, child); !done) return done;
+        include(path_.back().record, tree[child].record);
+      }
+    }
+    tree[node].record = finished(path_.back());
+    path_.pop_back();
+    return {};
+  }
+
+  static TileRecord finished(const OnPath& tile) {
+    TileRecord record = tile.record;
+    const double error = kBetweenSamples * tile.worst;
+    if (error > 0.0) record.error = std::max(record.error, std::nextafter(static_cast<float>(error), INFINITY));
+    return record;
+  }
+
+  Result<void> scan_leaf() {
+    OnPath& leaf = path_.back();
+    const auto [lowest, highest] = std::minmax_element(leaf.heights.begin(), leaf.heights.end());
+    extend_range(*lowest, *highest);
+    for (std::size_t i = 0; i < model_.layer_count(); ++i) {
+      if (!model_.layer(i).source->coverage().touches(leaf.key)) continue;
+      if (Result<void> scanned = scan_raster(model_.raster(i)); !scanned) return scanned;
+    }
+    for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
+      path_[i].record.min_height = std::min(path_[i].record.min_height, leaf.record.min_height);
+      path_[i].record.max_height = std::max(path_[i].record.max_height, leaf.record.max_height);
+    }
+    return {};
+  }
+
+  void extend_range(double low, double high) {
+    TileRecord& record = path_.back().record;
+    record.min_height = std::min(record.min_height, static_cast<float>(std::floor(low)));
+    record.max_height = std::max(record.max_height, static_cast<float>(std::ceil(high)));
+  }
+
+  /// Compares all samples of a raster within the leaf with the whole path, and the places half-way to the samples on the left,
+  /// above, and across with the two finest grids.
+  Result<void> scan_raster(cache::CachedRaster& raster) {
+    const std::optional<source::PixelWindow> window = window_under_leaf(raster);
+    if (!window) return {};
+    const OnPath& leaf = path_.back();
+    // Samples just outside shape the surface within: two of them, in face coordinates.
+    const double quarter = model_.description().ellipsoid.b() * std::numbers::pi / 4.0;
+    const double spacing = raster.description().spacing.value;
+    const double ring = 3.0 * spacing / quarter;
+    const auto width = static_cast<std::size_t>(window->width);
+    above_.assign(width, {});
+    for (int row = 0; row < window->height; ++row) {
+      if (Result<void> read = read_row(raster, window->x, window->y + row, window->width, leaf, ring); !read) return read;
+      for (std::size_t x = 0; x < width; ++x) {
+        const FaceSample& here = row_[x];
+        if (here.within) {
+          for (OnPath& tile : path_) tile.compare(here.uv, here.metres);
+        }
+        if (x > 0) compare_between(here, row_[x - 1]);
+        compare_between(here, above_[x]);
+        if (x > 0) compare_middle({here, row_[x - 1], above_[x], above_[x - 1]});
+      }
+      std::swap(row_, above_);
+    }
+    return {};
+  }
+
+  void compare_between(const FaceSample& a, const FaceSample& b) {
+    if (a.within && b.within) compare_finest((a.uv + b.uv) / 2.0, (a.metres + b.metres) / 2.0);
+  }
+  void compare_middle(const std::array<FaceSample, 4>& s) {
+    if (s[0].within && s[1].within && s[2].within && s[3].within) {
+      compare_finest((s[0].uv + s[1].uv + s[2].uv + s[3].uv) / 4.0,
+                     (s[0].metres + s[1].metres + s[2].metres + s[3].metres) / 4.0);
+    }
+  }
+  void compare_finest(glm::dvec2 uv, double metres) {
+    const std::size_t first = path_.size() >= 2 ? path_.size() - 2 : 0;
+    for (std::size_t i = first; i < path_.size(); ++i) path_[i].compare(uv, metres);
+  }
+
+  /// One row of the raster's samples: where they lie on the face, and the surface's height where that is on the leaf.
+  Result<void> read_row(cache::CachedRaster& raster, int first, int y, int width, const OnPath& leaf, double ring) {
+    const auto count = static_cast<std::size_t>(width);
+    const int columns = raster.description().levels.front().width;
+    pixels_.resize(count);
+    places_.resize(count);
+    row_.assign(count, {});
+    for (int i = 0; i < width; ++i) pixels_[static_cast<std::size_t>(i)] = {(first + i) % columns + 0.5, y + 0.5};
+    raster.reader().to_places(pixels_, places_);
+    wanted_.clear();
+    wanted_places_.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!std::isfinite(places_[i].latitude.value) || !std::isfinite(places_[i].longitude.value)) continue;
+      const std::optional<glm::dvec2> uv = geo::project_to_face(leaf.key.face, geo::normal_at(places_[i]));
+      if (!uv) continue;
+      const glm::dvec2 below = leaf.rect.lower - *uv, beyond = *uv - leaf.rect.upper;
+      const double outside = std::max(std::max(below.x, below.y), std::max(beyond.x, beyond.y));
+      if (outside > ring) continue;
+      row_[i].uv = *uv;
+      row_[i].within = outside <= 0.0;
+      wanted_.push_back(i);
+      wanted_places_.push_back(places_[i]);
+    }
+    if (wanted_.empty()) return {};
+    metres_.resize(wanted_.size());
+    if (Result<void> read = model_.heights(wanted_places_, 0.0, metres_); !read) return read;
+    for (std::size_t i = 0; i < wanted_.size(); ++i) row_[wanted_[i]].metres = metres_[i];
+    const auto [lowest, highest] = std::minmax_element(metres_.begin(), metres_.end());
+    extend_range(*lowest, *highest);
+    return {};
+  }
+
+  /// Columns and rows that hold all samples within the leaf and round it; x may run past the raster's width where it wraps.
+  std::optional<source::PixelWindow> window_under_leaf(cache::CachedRaster& raster) {
+    constexpr int kSide = 17;
+    const source::RasterDescription& about = raster.description();
+    const source::LevelSize size = about.levels.front();
+    const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(path_.back().key, kSide);
+    places_.resize(normals.size());
+    pixels_.resize(normals.size());
+    std::transform(normals.begin(), normals.end(), places_.begin(), geo::place_of_normal);
+    raster.reader().to_pixels(places_, pixels_);
+
+    const source::PixelWindow everything{0, 0, size.width, size.height};
+    glm::dvec2 low(INFINITY), high(-INFINITY);
+    bool all_columns = false;
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      glm::dvec2& pixel = pixels_[i];
+      if (!std::isfinite(pixel.x) || !std::isfinite(pixel.y)) return everything;
+      if (about.wraps && i > 0) {
+        // Round a pole, steps are long; elsewhere they are a small part of the way round.
+        const double before = pixels_[i % kSide > 0 ? i - 1 : i - kSide].x;
+        pixel.x -= size.width * std::round((pixel.x - before) / size.width);
+        all_columns = all_columns || std::abs(pixel.x - before) > size.width / 8.0;
+      }
+      low = glm::min(low, pixel);
+      high = glm::max(high, pixel);
+    }
+    const glm::dvec2 spare = (high - low) / 16.0 + 3.0;
+    low = glm::floor(low - spare);
+    high = glm::ceil(high + spare);
+    const auto clamped = [](double value, int most) { return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most))); };
+    source::PixelWindow window;
+    window.y = clamped(low.y, size.height);
+    window.height = clamped(high.y, size.height) - window.y;
+    if (!about.wraps) {
+      window.x = clamped(low.x, size.width);
+      window.width = clamped(high.x, size.width) - window.x;
+    } else if (all_columns || high.x - low.x >= size.width) {
+      window.width = size.width;
+    } else {
+      window.x = static_cast<int>(low.x - size.width * std::floor(low.x / size.width));
+      window.width = static_cast<int>(high.x - low.x);
+    }
+    if (window.width <= 0 || window.height <= 0) return std::nullopt;
+    return window;
+  }
+
+  ElevationModel& model_;
+  std::stop_token stop_;
+  std::vector<OnPath> path_;
+  std::vector<glm::dvec2> pixels_;
+  std::vector<geo::LatLon> places_;
+  std::vector<std::size_t> wanted_;
+  std::vector<geo::LatLon> wanted_places_;
+  std::vector<double> metres_;
+  std::vector<FaceSample> row_;
+  std::vector<FaceSample> above_;
+};
+
+}  // namespace
+
+bool is_scanned(const Layer& layer) {
+  const source::LevelSize& size = layer.source->description().levels.front();
+  return layer.enabled && static_cast<double>(size.width) * size.height <= kMostScannedSamples;
+}
+
+double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
+  double finest = std::numeric_limits<double>::infinity();
+  for (const Layer& layer : layers) {
+    if (!layer.enabled || !layer.source->coverage().touches(key)) continue;
+    finest = std::min(finest, layer.source->coverage().spacing_under(key).value);
+  }
+  return finest;
+}
+
+std::string table_revision(const SurfaceDescription& description) {
+  std::string revision = std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
+  for (const Layer& layer : description.heights) {
+    if (!is_scanned(layer)) continue;
+    revision += layer.adds ? "\n+" : "\n=";
+    revision += layer.source->revision();
+  }
+  return revision;
+}
+
+SurfaceDescription scanned_part(const SurfaceDescription& description) {
+  SurfaceDescription part;
+  part.ellipsoid = description.ellipsoid;
+  part.revision = description.revision;
+  std::copy_if(description.heights.begin(), description.heights.end(), std::back_inserter(part.heights), is_scanned);
+  return part;
+}
+
+std::vector<geo::TileKey> scan_jobs() {
+  std::vector<geo::TileKey> jobs;
+  for (std::uint8_t face = 0; face < geo::kFaceCount; ++face) {
+    for (std::uint32_t i = 0; i < kJobsPerFace; ++i) {
+      jobs.push_back({face, kJobLevel, i % (1u << kJobLevel), i >> kJobLevel});
+    }
+  }
+  return jobs;
+}
+
+Result<SubtreeScan> scan_subtree(ElevationModel& model, const geo::TileKey& root, std::stop_token stop) {
+  return Scanner(model, std::move(stop)).run(root);
+}
+
+ErrorTable merge_scans(std::span<const SubtreeScan> scans) {
+  RecordTree tree(geo::kFaceCount);
+  for (RecordTree::Node& node : tree.nodes()) node.record = kNothingYet;
+  for (const SubtreeScan& scan : scans) {
+    std::size_t node = scan.root.face;
+    for (int level = 0; level < scan.root.level; ++level) {
+      include(tree[node].record, scan.above[static_cast<std::size_t>(level)]);
+      include(tree[node].record, scan.tree[0].record);
+      if (tree[node].children == 0) {
+        const std::size_t first = tree.add_children(node);
+        for (std::size_t i = 0; i < 4; ++i) tree[first + i].record = kNothingYet;
+      }
+      node = tree[node].children + static_cast<std::size_t>(geo::child_index(geo::ancestor(scan.root, level + 1)));
+    }
+    // The subtree's own root takes the place that is there; all that follow move up behind what the table already holds.
+    const auto shift = static_cast<std::uint32_t>(tree.size() - 1);
+    for (std::size_t i = 0; i < scan.tree.size(); ++i) {
+      RecordTree::Node moved = scan.tree[i];
+      if (moved.children != 0) moved.children += shift;
+      if (i == 0) {
+        tree[node] = moved;
+      } else {
+        tree.nodes().push_back(moved);
+      }
+    }
+  }
+  return ErrorTable(std::move(tree));
+}
+
+}  // namespace tellurion::surface

@@ -1,0 +1,70 @@
+#include "surface/surface_facts_made.h"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "surface/error_scan.h"
+#include "surface/tile_grid.h"
+
+namespace tellurion::surface {
+namespace {
+
+/// Spacings of equal data and tiles differ by rounding and by what the planet's shape does to them: no level for that.
+constexpr double kClearlyFiner = 0.999;
+
+class MadeFacts final : public SurfaceFacts {
+ public:
+  MadeFacts(std::shared_ptr<const SurfaceDescription> description, std::shared_ptr<const ErrorTable> table)
+      : description_(std::move(description)), table_(std::move(table)) {}
+
+  TileFacts facts_of(const geo::TileKey& key) const override {
+    const geo::Ellipsoid& ellipsoid = description_->ellipsoid;
+    TileFacts facts;
+    bool assumed = false;
+    double finest_height = std::numeric_limits<double>::infinity();
+    for (const Layer& layer : description_->heights) {
+      if (!layer.enabled || !layer.source->coverage().touches(key)) continue;
+      finest_height = std::min(finest_height, layer.source->coverage().spacing_under(key).value);
+      assumed = assumed || !table_ || !is_scanned(layer);
+    }
+    if (table_) {
+      const ErrorTable::Found found = table_->find(key);
+      facts.min_height = found.record.min_height;
+      facts.max_height = found.record.max_height;
+      if (found.own) facts.height_error = found.record.error;
+    }
+    const double spacing = nominal_grid_spacing(ellipsoid, key.level);
+    if (assumed) {
+      facts.min_height = std::min(facts.min_height, kAssumedMinHeight);
+      facts.max_height = std::max(facts.max_height, kAssumedMaxHeight);
+      if (spacing > kFinestGridOfTable * finest_height) {
+        const auto error = static_cast<float>(kAssumedSlope * spacing * std::numbers::sqrt2 / 2.0);
+        facts.height_error = std::max(facts.height_error.value_or(0.0f), error);
+      }
+    }
+    if (!facts.height_error && finest_height == std::numeric_limits<double>::infinity()) facts.height_error = 0.0f;
+
+    const double finest_colour = finest_spacing(description_->colours, key);
+    const double colour_texel = nominal_colour_texel(ellipsoid, key.level);
+    facts.own_colour = key.level == 0 || finest_colour < kClearlyFiner * 2.0 * colour_texel;
+    facts.finer_colour_below = finest_colour < kClearlyFiner * colour_texel;
+    facts.own_slopes = key.level == 0 || finest_height < kClearlyFiner * 2.0 * nominal_slope_texel(ellipsoid, key.level);
+    return facts;
+  }
+
+ private:
+  std::shared_ptr<const SurfaceDescription> description_;
+  std::shared_ptr<const ErrorTable> table_;
+};
+
+}  // namespace
+
+std::shared_ptr<const SurfaceFacts> make_facts(std::shared_ptr<const SurfaceDescription> description,
+                                               std::shared_ptr<const ErrorTable> table) {
+  return std::make_shared<MadeFacts>(std::move(description), std::move(table));
+}
+
+}  // namespace tellurion::surface
