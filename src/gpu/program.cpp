@@ -1,6 +1,9 @@
 #include "gpu/program.h"
 
-#include <cctype>
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <sstream>
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -8,42 +11,64 @@
 namespace tellurion::gpu {
 namespace {
 
-std::string full_text(const RenderThread& thread, const ProgramSource& source, const std::vector<ShaderText>& texts,
-                      std::uint32_t features) {
-  std::string all = thread.capabilities().is_es
-                        ? "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-                          "precision highp sampler2D;\nprecision highp sampler2DArray;\n"
-                        : "#version 410 core\n";
+/// One text for the driver, and where in it each piece begins.
+struct FullText {
+  std::string text;
+  std::vector<std::ptrdiff_t> first_lines;  // of the pieces, counted from 1
+};
+
+FullText full_text(const RenderThread& thread, const ProgramSource& source, const std::vector<ShaderText>& pieces,
+                   std::uint32_t features) {
+  FullText all;
+  all.text = thread.capabilities().is_es
+                 ? "#version 300 es\nprecision highp float;\nprecision highp int;\n"
+                   "precision highp sampler2D;\nprecision highp sampler2DArray;\n"
+                 : "#version 410 core\n";
   for (std::size_t i = 0; i < source.features.size(); ++i)
-    if (features >> i & 1u) all += fmt::format("#define {} 1\n", source.features[i]);
-  for (std::size_t i = 0; i < texts.size(); ++i) all += fmt::format("#line 1 {}\n{}\n", i, texts[i].text);
+    if (features >> i & 1u) all.text += fmt::format("#define {} 1\n", source.features[i]);
+  for (const ShaderText& piece : pieces) {
+    all.first_lines.push_back(1 + std::count(all.text.begin(), all.text.end(), '\n'));
+    all.text += piece.text;
+    all.text += '\n';
+  }
   return all;
 }
 
-/// Drivers name the text by its number: `1:23(5): error` (Mesa, ANGLE) or `1(23) : error` (NVIDIA). Writes its name there.
-std::string with_file_names(const std::string& log, const std::vector<ShaderText>& texts) {
+/// A number at `position` of `line`, which moves behind it; negative if there is none.
+std::ptrdiff_t read_number(const std::string& line, std::size_t& position) {
+  std::ptrdiff_t number = 0;
+  const auto [end, status] = std::from_chars(line.data() + position, line.data() + line.size(), number);
+  if (status != std::errc()) return -1;
+  position = static_cast<std::size_t>(end - line.data());
+  return number;
+}
+
+/// Drivers name a place by the text's number, 0, and the line: `0:23(5): error` (Mesa, ANGLE), `0(23) : error` (NVIDIA).
+/// Writes the piece's name and its own line there instead.
+std::string with_places(const std::string& log, const FullText& all, const std::vector<ShaderText>& pieces) {
   std::string out;
-  std::size_t begin = 0;
-  while (begin < log.size()) {
-    const std::size_t end = std::min(log.find('\n', begin), log.size());
-    std::string line = log.substr(begin, end - begin);
-    const std::size_t first = line.find_first_of("0123456789");
-    std::size_t last = first;
-    while (last < line.size() && std::isdigit(static_cast<unsigned char>(line[last]))) ++last;
-    if (first != std::string::npos && last - first <= 2 && last < line.size() && (line[last] == ':' || line[last] == '(')) {
-      const auto number = static_cast<std::size_t>(std::stoi(line.substr(first, last - first)));
-      if (number < texts.size()) line.replace(first, last - first, texts[number].name);
+  std::istringstream lines(log);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t begin = line.find_first_of("0123456789");
+    std::size_t end = begin;
+    if (begin != std::string::npos && read_number(line, end) == 0 && end < line.size() &&
+        (line[end] == ':' || line[end] == '(')) {
+      const std::ptrdiff_t number = read_number(line, ++end);
+      const auto next = std::upper_bound(all.first_lines.begin(), all.first_lines.end(), number);
+      if (next != all.first_lines.begin()) {
+        const auto piece = static_cast<std::size_t>(next - all.first_lines.begin() - 1);
+        line.replace(begin, end - begin, fmt::format("{}:{}", pieces[piece].name, number - all.first_lines[piece] + 1));
+      }
     }
-    if (!line.empty()) out += (out.empty() ? "" : "\n") + line;
-    begin = end + 1;
+    out += (out.empty() ? "" : "\n") + line;
   }
   return out;
 }
 
 /// The shader object, or 0 with the message in `error`.
-GLuint compile(GLenum stage, const std::string& text, const std::vector<ShaderText>& texts, std::string& error) {
+GLuint compile(GLenum stage, const FullText& all, const std::vector<ShaderText>& pieces, std::string& error) {
   const GLuint shader = glCreateShader(stage);
-  const char* pointer = text.c_str();
+  const char* pointer = all.text.c_str();
   glShaderSource(shader, 1, &pointer, nullptr);
   glCompileShader(shader);
   GLint ok = 0;
@@ -55,7 +80,7 @@ GLuint compile(GLenum stage, const std::string& text, const std::vector<ShaderTe
   glGetShaderInfoLog(shader, length, &length, log.data());
   log.resize(static_cast<std::size_t>(length));
   glDeleteShader(shader);
-  error = with_file_names(log, texts);
+  error = with_places(log, all, pieces);
   return 0;
 }
 

@@ -30,6 +30,12 @@ glm::dmat4 projection(const view::Camera& camera, bool reversed) {
   return p;
 }
 
+/// Pictures from space are exposed for the bright disc, those from the ground for the sky: share of the air's brightness.
+double exposure(double height_m) {
+  const double t = std::clamp((height_m - 20e3) / 300e3, 0.0, 1.0);
+  return 1.0 - 0.5 * t * t * (3.0 - 2.0 * t);
+}
+
 /// Angle of the rays from `distance` that touch a sphere of `radius`, above the horizontal.
 double tangent_angle(double radius, double distance) { return -std::acos(std::min(radius / distance, 1.0)); }
 
@@ -47,7 +53,7 @@ void add_air(FrameBlock& block, const view::Camera& camera, const FrameLook& loo
   // Without shading it is noon wherever the eye is.
   const dvec3 sun = look.lighting ? glm::normalize(look.to_sun.xyz * scale) : up;
 
-  block.air_sun = glm::vec4(sun, air.brightness);
+  block.air_sun = glm::vec4(sun, air.brightness * exposure((distance - 1.0) * ellipsoid.a()));
   block.air_eye = glm::vec4(eye, 0.0);
   block.air_scale = glm::vec4(scale, air.scale_height_m / ellipsoid.a());
   block.air_scatter = glm::vec4(air.scattering_per_m * ellipsoid.a(), air.haze_per_m * ellipsoid.a());

@@ -70,8 +70,8 @@ inline surface::TileImagery exact_imagery(const geo::TileKey& key, const ColourF
     }
   }
   patch.columns = patch.rows = 1;
-  patch.lower = glm::vec2(-surface::kColourGutter / kInner);
-  patch.upper = glm::vec2(1.0 + surface::kColourGutter / kInner);
+  patch.lower = glm::vec2(static_cast<float>(-surface::kColourGutter / kInner));
+  patch.upper = glm::vec2(static_cast<float>(1.0 + surface::kColourGutter / kInner));
   patch.image_points = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   patch.opaque = true;
   surface::TileImagery imagery;
