@@ -142,7 +142,7 @@ double intersect_ray(const Ellipsoid& ellipsoid, Metres height, const Point<Ecef
     const Geodetic here = to_geodetic(ellipsoid, eye + direction * t);
     const double climb = glm::dot(normal_at(place_of(here)).xyz, direction.xyz);
     const double excess = here.height.value - height.value;
-    if (std::abs(climb) < 1e-3 || std::abs(excess) < 1e-9 * std::abs(height.value)) break;
+    if (std::abs(climb) < 1e-3 || std::abs(excess) < 4e-15 * ellipsoid.a()) break;
     t -= excess / climb;
   }
   return std::max(t, 0.0);

@@ -51,7 +51,7 @@ glm::dmat3 enu_axes(const LatLon& place);
 Transform<Ecef, Enu> enu_at(const Ellipsoid& ellipsoid, const Geodetic& origin);
 
 /// Distance from `eye` along the unit `direction` to the ellipsoid raised by `height`; negative if the ray misses
-/// it or it lies behind the eye. From inside, the way out.
+/// it or it lies behind the eye. From inside, the way out. Exact to 1e-6 m of height unless the ray grazes the surface.
 double intersect_ray(const Ellipsoid& ellipsoid, Metres height, const Point<Ecef>& eye, const Vector<Ecef>& direction);
 
 }  // namespace tellurion::geo

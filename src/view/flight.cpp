@@ -59,29 +59,33 @@ Result<Flight> Flight::create(std::vector<FlightSample> samples) {
     knot.turn = quaternion_of(axes_of(pose));
     knot.height = pose.position.height.value;
     if (i > 0) {
-      const Knot& last = flight.knots_.back();
+      const Knot& previous = flight.knots_.back();
       const std::string number = std::to_string(i + 1);
       if (!(samples[i].time_s > samples[i - 1].time_s))
         return fail("sample " + number + " is not later than the one before");
-      if (glm::dot(knot.normal, last.normal) < kLargestStep) {
+      if (glm::dot(knot.normal, previous.normal) < kLargestStep) {
         return fail("sample " + number + " lies on the other side of the planet: add samples on the way");
       }
-      if (glm::dot(knot.turn, last.turn) < 0.0) knot.turn = -knot.turn;
+      if (glm::dot(knot.turn, previous.turn) < 0.0) knot.turn = -knot.turn;
     }
     flight.knots_.push_back(knot);
   }
-  for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
-    const Knot& last = flight.knots_[i - 1];
-    const Knot& next = flight.knots_[i + 1];
+  // At its ends the flight keeps the mean rate of the first and the last stretch.
+  const std::size_t last = samples.size() - 1;
+  for (std::size_t i = 0; last > 0 && i <= last; ++i) {
+    const std::size_t before = i > 0 ? i - 1 : 0;
+    const std::size_t after = std::min(i + 1, last);
+    const double before_s = i > 0 ? samples[i].time_s - samples[before].time_s : 0.0;
+    const double after_s = i < last ? samples[after].time_s - samples[i].time_s : 0.0;
     Knot& here = flight.knots_[i];
-    const double before_s = samples[i].time_s - samples[i - 1].time_s;
-    const double after_s = samples[i + 1].time_s - samples[i].time_s;
     const auto rate = [&](const auto& v0, const auto& v1, const auto& v2) {
+      if (i == 0) return (v2 - v1) / after_s;
+      if (i == last) return (v1 - v0) / before_s;
       return limited_rate((v1 - v0) / before_s, before_s, (v2 - v1) / after_s, after_s);
     };
-    here.normal_rate = rate(last.normal, here.normal, next.normal);
-    here.turn_rate = rate(last.turn, here.turn, next.turn);
-    here.height_rate = rate(last.height, here.height, next.height);
+    here.normal_rate = rate(flight.knots_[before].normal, here.normal, flight.knots_[after].normal);
+    here.turn_rate = rate(flight.knots_[before].turn, here.turn, flight.knots_[after].turn);
+    here.height_rate = rate(flight.knots_[before].height, here.height, flight.knots_[after].height);
   }
   flight.samples_ = std::move(samples);
   return flight;

@@ -40,9 +40,9 @@ class Flight {
 
   /// A sample in coordinates without poles or jumps, with the rates at which they change.
   struct Knot {
-    glm::dvec3 normal, normal_rate;
-    glm::dvec4 turn,
-        turn_rate;  ///< quaternion (x, y, z, w) of the camera axes in ECEF, in one hemisphere with its neighbour
+    glm::dvec3 normal{0.0}, normal_rate{0.0};
+    /// Quaternion (x, y, z, w) of the camera axes in ECEF, of the two the one nearer to the neighbour's.
+    glm::dvec4 turn{0.0}, turn_rate{0.0};
     double height = 0, height_rate = 0;
   };
 
