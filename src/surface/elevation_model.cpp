@@ -8,6 +8,7 @@
 #include <numbers>
 #include <utility>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 namespace tellurion::surface {
@@ -40,8 +41,23 @@ double spacing_of_level(const source::RasterDescription& raster, int level) {
   return std::ldexp(raster.spacing.value, level);
 }
 
-void compose(double& below, const cache::HeightSample& sample, bool adds) {
+void compose_one(double& below, const cache::HeightSample& sample, bool adds) {
   below += sample.coverage * (adds ? sample.metres : sample.metres - below);
+}
+
+bool is_finite(const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); }
+
+/// The place within the raster nearest to a pixel, and the share of the raster's coverage that is left there.
+struct WithinRaster {
+  glm::dvec2 pixel;
+  double reach = 1.0;
+};
+WithinRaster bring_within(const source::RasterDescription& raster, int level, const glm::dvec2& pixel) {
+  const source::LevelSize& full = raster.levels.front();
+  glm::dvec2 nearest = glm::clamp(pixel, glm::dvec2(0.0), glm::dvec2(full.width, full.height));
+  if (raster.wraps) nearest.x = pixel.x;
+  const glm::dvec2 beyond = glm::abs(pixel - nearest) * source::level_scale(raster, level);
+  return {nearest, std::max(0.0, 1.0 - beyond.x) * std::max(0.0, 1.0 - beyond.y)};
 }
 
 }  // namespace
@@ -76,24 +92,71 @@ Result<void> ElevationModel::heights(std::span<const geo::Vector<geo::Ecef>> nor
 
 Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double wanted_spacing,
                                      std::span<double> metres) {
-  assert(places.size() == metres.size());
+  spacings_.resize(places.size());
+  return compose(places, wanted_spacing, metres, spacings_);
+}
+
+Result<void> ElevationModel::compose(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres,
+                                     std::span<double> spacings) {
+  assert(places.size() == metres.size() && places.size() == spacings.size());
   std::fill(metres.begin(), metres.end(), 0.0);
+  std::fill(spacings.begin(), spacings.end(), std::numeric_limits<double>::infinity());
   for (HeightLayer& layer : layers_) {
     inside_.clear();
     inside_places_.clear();
+    below_.clear();
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (!holds(layer.reach, places[i])) continue;
       inside_.push_back(static_cast<std::uint32_t>(i));
       inside_places_.push_back(places[i]);
+      below_.push_back(spacings[i]);
     }
     if (inside_.empty()) continue;
-    pixels_.resize(inside_.size());
-    samples_.resize(inside_.size());
-    layer.raster.reader().to_pixels(inside_places_, pixels_);
-    const int level = level_for_spacing(layer.raster.description(), wanted_spacing);
-    if (Result<void> read = layer.raster.sample_heights(level, pixels_, samples_); !read) return read;
+    if (Result<void> read = sample_layer(layer, wanted_spacing); !read) return read;
     for (std::size_t i = 0; i < inside_.size(); ++i) {
-      compose(metres[inside_[i]], samples_[i], layer.settings->adds);
+      compose_one(metres[inside_[i]], samples_[i], layer.settings->adds);
+      if (samples_[i].coverage > 0.0) spacings[inside_[i]] = std::min(spacings[inside_[i]], finest_[i]);
+    }
+  }
+  return {};
+}
+
+/// Samples of a layer at inside_places_, its voids filled from coarser levels.
+Result<void> ElevationModel::sample_layer(HeightLayer& layer, double wanted_spacing) {
+  const source::RasterDescription& raster = layer.raster.description();
+  const int level = level_for_spacing(raster, wanted_spacing);
+  pixels_.resize(inside_places_.size());
+  samples_.resize(pixels_.size());
+  finest_.assign(pixels_.size(), spacing_of_level(raster, level));
+  layer.raster.reader().to_pixels(inside_places_, pixels_);
+  if (Result<void> read = layer.raster.sample_heights(level, pixels_, samples_); !read) return read;
+  if (layer.settings->adds) return {};
+
+  void_.clear();
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    if (samples_[i].coverage < 1.0 && is_finite(pixels_[i]) && bring_within(raster, level, pixels_[i]).reach > 0.0) {
+      void_.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  const int coarsest = std::min(kCoarsestFill, static_cast<int>(raster.levels.size()) - 1);
+  for (int coarse = level + 1; coarse <= coarsest && !void_.empty(); ++coarse) {
+    const double spacing = spacing_of_level(raster, coarse);
+    std::erase_if(void_, [&](std::uint32_t i) {
+      return spacing > below_[i] || samples_[i].coverage >= bring_within(raster, level, pixels_[i]).reach;
+    });
+    void_pixels_.clear();
+    for (const std::uint32_t i : void_) void_pixels_.push_back(bring_within(raster, level, pixels_[i]).pixel);
+    void_samples_.resize(void_.size());
+    if (Result<void> read = layer.raster.sample_heights(coarse, void_pixels_, void_samples_); !read) return read;
+    for (std::size_t n = 0; n < void_.size(); ++n) {
+      const std::uint32_t i = void_[n];
+      const double missing = bring_within(raster, level, pixels_[i]).reach - samples_[i].coverage;
+      const double added = missing * void_samples_[n].coverage;
+      if (added <= 0.0) continue;
+      if (samples_[i].coverage == 0.0) finest_[i] = spacing;
+      const double coverage = samples_[i].coverage + added;
+      samples_[i].metres += (void_samples_[n].metres - samples_[i].metres) * (added / coverage);
+      samples_[i].coverage = coverage;
     }
   }
   return {};
@@ -101,25 +164,27 @@ Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double
 
 Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Lookup lookup, double wanted_spacing) {
   ElevationAnswer answer{0.0, std::numeric_limits<double>::infinity()};
+  if (lookup == Lookup::bilinear) {
+    const Result<void> read = compose({&place, 1}, wanted_spacing, {&answer.metres, 1}, {&answer.spacing, 1});
+    return read ? Result<ElevationAnswer>(answer) : read.error();
+  }
   for (HeightLayer& layer : layers_) {
     if (!holds(layer.reach, place)) continue;
     const source::RasterDescription& raster = layer.raster.description();
     const int level = level_for_spacing(raster, wanted_spacing);
     glm::dvec2 pixel;
     layer.raster.reader().to_pixels({&place, 1}, {&pixel, 1});
-    if (lookup == Lookup::nearest) {
-      const source::LevelSize& full = raster.levels.front();
-      const bool beyond = !(pixel.x >= 0.0 && pixel.x <= full.width && pixel.y >= 0.0 && pixel.y <= full.height);
-      if (beyond) continue;
-      // At a sample's own place the bilinear value is the sample.
-      const glm::dvec2 scale = source::level_scale(raster, level);
-      const source::LevelSize& size = raster.levels[static_cast<std::size_t>(level)];
-      const glm::dvec2 last(size.width - 1, size.height - 1);
-      pixel = (glm::min(glm::floor(pixel * scale), last) + 0.5) / scale;
-    }
+    const source::LevelSize& full = raster.levels.front();
+    const bool within = pixel.x >= 0.0 && pixel.x <= full.width && pixel.y >= 0.0 && pixel.y <= full.height;
+    if (!within) continue;
+    // At a sample's own place the bilinear value is the sample.
+    const glm::dvec2 scale = source::level_scale(raster, level);
+    const source::LevelSize& size = raster.levels[static_cast<std::size_t>(level)];
+    const glm::dvec2 last(size.width - 1, size.height - 1);
+    pixel = (glm::min(glm::floor(pixel * scale), last) + 0.5) / scale;
     cache::HeightSample sample;
     if (Result<void> read = layer.raster.sample_heights(level, {&pixel, 1}, {&sample, 1}); !read) return read.error();
-    compose(answer.metres, sample, layer.settings->adds);
+    compose_one(answer.metres, sample, layer.settings->adds);
     if (sample.coverage > 0.0) answer.spacing = std::min(answer.spacing, spacing_of_level(raster, level));
   }
   return answer;

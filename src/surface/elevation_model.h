@@ -29,6 +29,9 @@ struct Layer {
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
 };
 
+/// The coarsest level of a layer that fills its voids: 64 samples across.
+inline constexpr int kCoarsestFill = 6;
+
 /// All that the surface is made of. Immutable, shared; a change makes a new one with a new revision.
 struct SurfaceDescription {
   geo::Ellipsoid ellipsoid;
@@ -46,7 +49,9 @@ struct ElevationAnswer {
 };
 
 /// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
-/// continuous across voids and borders; 0 where there is nothing.
+/// continuous across voids and borders; 0 where there is nothing. A void inside a layer shows the finest data that there are:
+/// the layer's own coarser levels, made of the samples round the void, as long as they are finer than the layers below (not
+/// beyond level kCoarsestFill); then those layers. So a hole of some samples in a mountain is no pit down to a coarse globe.
 class ElevationModel {
  public:
   static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
@@ -58,7 +63,7 @@ class ElevationModel {
   Result<void> heights(std::span<const geo::Vector<geo::Ecef>> normals, double wanted_spacing, std::span<double> metres);
   Result<void> heights(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres);
 
-  /// One height. The same answer from either side of any sample, tile or face border.
+  /// One height. The same answer from either side of any sample, tile or face border. `nearest` fills no voids.
   Result<ElevationAnswer> height_at(const geo::LatLon& place, Lookup lookup, double wanted_spacing = 0);
 
   /// Unit normal of the elevation surface (bilinear) at `place`, ECEF.
@@ -81,12 +86,22 @@ class ElevationModel {
   std::shared_ptr<const SurfaceDescription> description_;
   std::vector<HeightLayer> layers_;
 
+  Result<void> compose(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres,
+                       std::span<double> spacings);
+  Result<void> sample_layer(HeightLayer& layer, double wanted_spacing);
+
   // Kept between calls: one allocation serves all batches.
   std::vector<geo::LatLon> places_;
-  std::vector<std::uint32_t> inside_;
+  std::vector<double> spacings_;
+  std::vector<std::uint32_t> inside_;         ///< the places that a layer reaches
   std::vector<geo::LatLon> inside_places_;
+  std::vector<double> below_;                 ///< spacing of the data below, there
   std::vector<glm::dvec2> pixels_;
   std::vector<cache::HeightSample> samples_;
+  std::vector<double> finest_;                ///< spacing of the level that answered
+  std::vector<std::uint32_t> void_;           ///< those of them that lack some data at the level tried last
+  std::vector<glm::dvec2> void_pixels_;
+  std::vector<cache::HeightSample> void_samples_;
 };
 
 /// The coarsest level of a raster whose samples are at most `wanted_spacing` metres apart; 0 if none is.

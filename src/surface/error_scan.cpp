@@ -9,9 +9,11 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "surface/rtin.h"
 #include "surface/tile_grid.h"
@@ -21,6 +23,7 @@ namespace {
 
 constexpr int kJobLevel = 2;
 constexpr int kJobsPerFace = 1 << (2 * kJobLevel);
+constexpr int kRun = 16;  ///< samples of a row that are left out together
 
 /// Samples are compared at their own places and half-way between; the true largest deviation lies a little above. The largest
 /// excess found over etopo5, SRTM and LOLA data, with a hundred random places a sample, was 0.03.
@@ -44,16 +47,16 @@ bool is_leaf(const SurfaceDescription& description, const geo::TileKey& key) {
 struct OnPath {
   geo::TileKey key;
   geo::FaceRect rect;
+  double steps_per_unit = 0.0;  ///< of the grid, per unit of face coordinates
   std::vector<double> heights;
   TileRecord record = kNothingYet;
 
-  /// Largest distance so far between the data and the grid.
   void compare(glm::dvec2 uv, double metres) {
-    const glm::dvec2 grid = (uv - rect.lower) / (rect.upper - rect.lower) * static_cast<double>(kGridSide - 1);
+    const glm::dvec2 grid = (uv - rect.lower) * steps_per_unit;
     const double shown = interpolate_in_triangles(heights, kGridSide, grid.x, grid.y);
     worst = std::max(worst, std::abs(metres - shown));
   }
-  double worst = 0.0;
+  double worst = 0.0;  ///< largest distance so far between the data and the grid
 };
 
 /// A sample of a raster, seen from the face.
@@ -83,6 +86,7 @@ class Scanner {
     OnPath tile;
     tile.key = key;
     tile.rect = geo::face_rect(key);
+    tile.steps_per_unit = (kGridSide - 1) / (tile.rect.upper.x - tile.rect.lower.x);
     const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kGridSide);
     tile.heights.resize(normals.size());
     const double spacing = nominal_grid_spacing(model_.description().ellipsoid, key.level);
@@ -138,7 +142,7 @@ class Scanner {
   }
 
   /// Compares all samples of a raster within the leaf with the whole path, and the places half-way to the samples on the left,
-  /// above, and across with the two finest grids.
+  /// above, and across with the leaf, whose grid is about as fine as they are.
   Result<void> scan_raster(cache::CachedRaster& raster) {
     const std::optional<source::PixelWindow> window = window_under_leaf(raster);
     if (!window) return {};
@@ -166,49 +170,75 @@ class Scanner {
   }
 
   void compare_between(const FaceSample& a, const FaceSample& b) {
-    if (a.within && b.within) compare_finest((a.uv + b.uv) / 2.0, (a.metres + b.metres) / 2.0);
+    if (a.within && b.within) path_.back().compare((a.uv + b.uv) / 2.0, (a.metres + b.metres) / 2.0);
   }
   void compare_middle(const std::array<FaceSample, 4>& s) {
     if (s[0].within && s[1].within && s[2].within && s[3].within) {
-      compare_finest((s[0].uv + s[1].uv + s[2].uv + s[3].uv) / 4.0,
+      path_.back().compare((s[0].uv + s[1].uv + s[2].uv + s[3].uv) / 4.0,
                      (s[0].metres + s[1].metres + s[2].metres + s[3].metres) / 4.0);
     }
-  }
-  void compare_finest(glm::dvec2 uv, double metres) {
-    const std::size_t first = path_.size() >= 2 ? path_.size() - 2 : 0;
-    for (std::size_t i = first; i < path_.size(); ++i) path_[i].compare(uv, metres);
   }
 
   /// One row of the raster's samples: where they lie on the face, and the surface's height where that is on the leaf.
   Result<void> read_row(cache::CachedRaster& raster, int first, int y, int width, const OnPath& leaf, double ring) {
-    const auto count = static_cast<std::size_t>(width);
     const int columns = raster.description().levels.front().width;
-    pixels_.resize(count);
-    places_.resize(count);
-    row_.assign(count, {});
-    for (int i = 0; i < width; ++i) pixels_[static_cast<std::size_t>(i)] = {(first + i) % columns + 0.5, y + 0.5};
-    raster.reader().to_places(pixels_, places_);
+    const auto pixel = [&](int i) { return glm::dvec2((first + i) % columns + 0.5, y + 0.5); };
+    row_.assign(static_cast<std::size_t>(width), {});
+
+    // Whole runs lie beside the leaf: told by their ends.
+    pixels_.clear();
+    for (int i = 0; i < width; i += kRun) pixels_.push_back(pixel(i));
+    pixels_.push_back(pixel(width - 1));
+    project(raster, leaf);
+    ends_ = projected_;
+    pixels_.clear();
     wanted_.clear();
-    wanted_places_.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!std::isfinite(places_[i].latitude.value) || !std::isfinite(places_[i].longitude.value)) continue;
-      const std::optional<glm::dvec2> uv = geo::project_to_face(leaf.key.face, geo::normal_at(places_[i]));
-      if (!uv) continue;
-      const glm::dvec2 below = leaf.rect.lower - *uv, beyond = *uv - leaf.rect.upper;
-      const double outside = std::max(std::max(below.x, below.y), std::max(beyond.x, beyond.y));
-      if (outside > ring) continue;
-      row_[i].uv = *uv;
-      row_[i].within = outside <= 0.0;
-      wanted_.push_back(i);
-      wanted_places_.push_back(places_[i]);
+    for (int i = 0; i < width; i += kRun) {
+      const auto run = static_cast<std::size_t>(i / kRun);
+      const double far = glm::distance(ends_[run], ends_[run + 1]) + ring;
+      if (outside(leaf, ends_[run]) > far && outside(leaf, ends_[run + 1]) > far) continue;
+      for (int j = i; j < std::min(i + kRun, width); ++j) {
+        wanted_.push_back(static_cast<std::size_t>(j));
+        pixels_.push_back(pixel(j));
+      }
     }
-    if (wanted_.empty()) return {};
-    metres_.resize(wanted_.size());
-    if (Result<void> read = model_.heights(wanted_places_, 0.0, metres_); !read) return read;
-    for (std::size_t i = 0; i < wanted_.size(); ++i) row_[wanted_[i]].metres = metres_[i];
+    project(raster, leaf);
+
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < wanted_.size(); ++n) {
+      const double distance = outside(leaf, projected_[n]);
+      if (!(distance <= ring)) continue;
+      FaceSample& sample = row_[wanted_[n]];
+      sample.uv = projected_[n];
+      sample.within = distance <= 0.0;
+      wanted_[count] = wanted_[n];
+      places_[count++] = places_[n];
+    }
+    if (count == 0) return {};
+    metres_.resize(count);
+    if (Result<void> read = model_.heights(std::span(places_).first(count), 0.0, metres_); !read) return read;
+    for (std::size_t n = 0; n < count; ++n) row_[wanted_[n]].metres = metres_[n];
     const auto [lowest, highest] = std::minmax_element(metres_.begin(), metres_.end());
     extend_range(*lowest, *highest);
     return {};
+  }
+
+  /// places_ and face coordinates of pixels_; NaN where there are none.
+  void project(cache::CachedRaster& raster, const OnPath& leaf) {
+    places_.resize(pixels_.size());
+    projected_.assign(pixels_.size(), glm::dvec2(NAN));
+    raster.reader().to_places(pixels_, places_);
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      if (!std::isfinite(places_[i].latitude.value) || !std::isfinite(places_[i].longitude.value)) continue;
+      const std::optional<glm::dvec2> uv = geo::project_to_face(leaf.key.face, geo::normal_at(places_[i]));
+      if (uv) projected_[i] = *uv;
+    }
+  }
+
+  /// How far a point lies beside a tile; NaN for one that is not there.
+  static double outside(const OnPath& tile, glm::dvec2 uv) {
+    const glm::dvec2 below = tile.rect.lower - uv, beyond = uv - tile.rect.upper;
+    return std::isfinite(uv.x) ? std::max(std::max(below.x, below.y), std::max(beyond.x, beyond.y)) : NAN;
   }
 
   /// Columns and rows that hold all samples within the leaf and round it; x may run past the raster's width where it wraps.
@@ -263,7 +293,8 @@ class Scanner {
   std::vector<glm::dvec2> pixels_;
   std::vector<geo::LatLon> places_;
   std::vector<std::size_t> wanted_;
-  std::vector<geo::LatLon> wanted_places_;
+  std::vector<glm::dvec2> projected_;
+  std::vector<glm::dvec2> ends_;
   std::vector<double> metres_;
   std::vector<FaceSample> row_;
   std::vector<FaceSample> above_;

@@ -161,19 +161,6 @@ class Extractor {
 
 }  // namespace
 
-double interpolate_in_triangles(std::span<const double> heights, int side, double x, double y) {
-  const int column = std::clamp(static_cast<int>(x), 0, side - 2);
-  const int row = std::clamp(static_cast<int>(y), 0, side - 2);
-  const double fx = x - column, fy = y - row;
-  const double* cell = heights.data() + index_of(column, row, side);
-  const double h00 = cell[0], h10 = cell[1], h01 = cell[side], h11 = cell[side + 1];
-  if (runs_down_right(column, row)) {
-    return fx >= fy ? h00 + fx * (h10 - h00) + fy * (h11 - h10) : h00 + fy * (h01 - h00) + fx * (h11 - h01);
-  }
-  return fx + fy <= 1.0 ? h00 + fx * (h10 - h00) + fy * (h01 - h00)
-                        : h11 + (1.0 - fx) * (h01 - h11) + (1.0 - fy) * (h10 - h11);
-}
-
 std::vector<float> midpoint_errors(std::span<const float> heights, int side) {
   assert(is_rtin_side(side) && heights.size() == static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   std::vector<float> errors(heights.size(), 0.0f);

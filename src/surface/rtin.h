@@ -7,6 +7,8 @@
 // After Evans, Kirkpatrick, Townsend (2001), doi:10.1007/s00453-001-0006-x.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -23,12 +25,23 @@ struct GridTriangles {
 /// Whether `side` is 2^k + 1 with k >= 1.
 constexpr bool is_rtin_side(int side) { return side >= 3 && ((side - 1) & (side - 2)) == 0; }
 
-/// The other end of the diagonal that halves a cell at full resolution lies at (odd, odd) points. For a cell at
-/// (column, row): whether it runs from its first corner to its last (else from the second to the third).
+/// How a cell is halved at full resolution, where all diagonals end at points of odd column and row: from its first corner to
+/// its last, else from the second to the third.
 constexpr bool runs_down_right(int column, int row) { return ((column ^ row) & 1) == 0; }
 
 /// Height at (x, y) in grid units of the full-resolution triangulation; x, y within [0, side - 1].
-double interpolate_in_triangles(std::span<const double> heights, int side, double x, double y);
+inline double interpolate_in_triangles(std::span<const double> heights, int side, double x, double y) {
+  const int column = std::clamp(static_cast<int>(x), 0, side - 2);
+  const int row = std::clamp(static_cast<int>(y), 0, side - 2);
+  const double fx = x - column, fy = y - row;
+  const double* cell = heights.data() + static_cast<std::size_t>(row * side + column);
+  const double h00 = cell[0], h10 = cell[1], h01 = cell[side], h11 = cell[side + 1];
+  if (runs_down_right(column, row)) {
+    return fx >= fy ? h00 + fx * (h10 - h00) + fy * (h11 - h10) : h00 + fy * (h01 - h00) + fx * (h11 - h01);
+  }
+  return fx + fy <= 1.0 ? h00 + fx * (h10 - h00) + fy * (h01 - h00)
+                        : h11 + (1.0 - fx) * (h01 - h11) + (1.0 - fy) * (h10 - h11);
+}
 
 /// Errors by the criterion of @mapbox/martini: at every point the distance between its height and the mean of its
 /// hypotenuse's ends, or the largest below it. Not a bound: the true deviation of a mesh can be 1.4 to 1.8 times larger.
