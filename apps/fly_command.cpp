@@ -1,0 +1,151 @@
+// tellurion fly: a recorded flight, as pictures or a video.
+#include "commands.h"
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "options.h"
+
+namespace tellurion::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct FlyOptions : Options {
+  std::filesystem::path flight;
+  double frames_per_second = 30.0;
+  double clock_rate = 1.0;
+  bool realtime = false;
+};
+
+/// Where a flight's pictures go: numbered PNGs in a folder, or one video.
+class PictureSink {
+ public:
+  static Result<PictureSink> open(const FlyOptions& options) {
+    PictureSink sink;
+    if (options.out.extension() == ".mp4") {
+      auto video = globe::VideoWriter::open(options.out, options.width, options.height, options.frames_per_second);
+      if (!video) return video.error();
+      sink.video_ = std::move(*video);
+      return sink;
+    }
+    std::error_code failure;
+    std::filesystem::create_directories(options.out, failure);
+    if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", options.out.string(), failure.message())};
+    sink.folder_ = options.out;
+    return sink;
+  }
+
+  Result<void> add(const raster::Image& image, int frame) {
+    return video_ ? video_->add(image) : globe::write_png(folder_ / fmt::format("{:06}.png", frame), image);
+  }
+
+  Result<void> close() { return video_ ? video_->close() : Result<void>(); }
+
+ private:
+  std::unique_ptr<globe::VideoWriter> video_;
+  std::filesystem::path folder_;
+};
+
+void show_progress(int frame, int count) {
+  if (!isatty(STDERR_FILENO)) return;
+  const int done = 40 * frame / std::max(count, 1);
+  fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {}/{}", "", done, "", 40 - done, frame, count);
+  if (frame == count) fmt::print(stderr, "\n");
+}
+
+int fly(const FlyOptions& options) {
+  auto flight = view::read_flight(options.flight);
+  if (!flight) return report(flight.error());
+  auto thread = gpu::RenderThread::headless(options.api);
+  if (!thread) return report(thread.error());
+  auto globe = open_globe(options);
+  if (!globe) return report(globe.error());
+  auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
+  if (!view) return report(view.error());
+  auto sink = PictureSink::open(options);
+  if (!sink) return report(sink.error());
+
+  globe::SummaryStats summary;
+  std::string trace = globe::trace_header();
+  bool complete = true;
+  const double duration = flight->end_s() - flight->start_s();
+  const int count = static_cast<int>(std::floor(duration * options.frames_per_second + 1e-9)) + 1;
+  const auto start = Clock::now();
+  for (int frame = 0; frame < count; ++frame) {
+    double elapsed = frame / options.frames_per_second;
+    if (options.realtime) {
+      // The flight's clock is the wall clock: slow frames are dropped, fast ones wait.
+      const double now = std::chrono::duration<double>(Clock::now() - start).count();
+      if (now > elapsed + 1.0 / options.frames_per_second && frame + 1 < count) continue;
+      if (now < elapsed) std::this_thread::sleep_for(std::chrono::duration<double>(elapsed - now));
+    }
+    const auto camera = view::make_camera((*globe)->ellipsoid(), flight->pose_at(flight->start_s() + elapsed),
+                                          to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
+    globe::ViewSettings settings = options.view;
+    settings.transitions = options.realtime;
+    if (settings.time) {
+      *settings.time += std::chrono::duration_cast<std::chrono::milliseconds>(
+          std::chrono::duration<double>(elapsed * options.clock_rate));
+    }
+    if (!options.realtime) {
+      const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
+      complete &= (*view)->finish(camera, settings, deadline);
+    }
+    globe::FrameStats stats = (*view)->draw(camera, settings);
+    stats.frame = frame;
+    stats.time = elapsed;
+    stats.resident_bytes = globe::resident_bytes();
+    summary.frame_ms.push_back(stats.frame_ms);
+    summary.last = stats;
+    if (!options.trace_file.empty()) trace += globe::trace_line(stats);
+    if (const auto added = sink->add((*view)->picture(camera, settings), frame); !added) return report(added.error());
+    show_progress(frame + 1, count);
+  }
+  summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  summary.sources = (*globe)->source_stats();
+  if (const auto closed = sink->close(); !closed) return report(closed.error());
+  if (!options.stats_file.empty()) {
+    if (const auto written = write_text(options.stats_file, globe::to_json(summary)); !written) return report(written.error());
+  }
+  if (!options.trace_file.empty()) {
+    if (const auto written = write_text(options.trace_file, trace); !written) return report(written.error());
+  }
+  if (!complete || (*globe)->data_missing()) {
+    fmt::print(stderr, "tellurion: {} is written, but some frames lack data\n", options.out.string());
+    return kDataMissing;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_fly(CLI::App& app, Run& run) {
+  auto options = std::make_shared<FlyOptions>();
+  CLI::App* command = app.add_subcommand("fly", "a flight as pictures or a video, every frame finished");
+  // One or two words: the flight, or the world and the flight.
+  auto words = std::make_shared<std::vector<std::string>>();
+  command->add_option("WORLD FLIGHT", *words, "the world (default: the embedded Earth) and the flight: a CSV with the header "
+                      "time,lat,lon,height,heading,pitch,roll")->required()->expected(1, 2)->type_name("");
+  command->add_option("--out", options->out, "a folder for numbered PNGs, or a video")->required()->type_name("DIR|FILE.mp4");
+  command->add_option("--fps", options->frames_per_second, "frames a second (30)")->check(CLI::Range(0.001, 1000.0))->type_name("N");
+  command->add_option("--clock-rate", options->clock_rate, "how fast the world's time runs (1)")->type_name("R");
+  command->add_flag("--realtime", options->realtime, "by the wall clock, finished or not");
+  command->add_option("--timeout", options->timeout_seconds, "for each frame to load (120)")->check(CLI::Range(0.0, 1e6))->type_name("S");
+  command->add_option("--stats", options->stats_file, "write the flight's figures")->type_name("FILE.json");
+  command->add_option("--trace", options->trace_file, "write the figures of every frame")->type_name("FILE.csv");
+  add_view_options(*command, *options);
+  add_resource_options(*command, *options);
+  command->callback([options, words, &run] {
+    options->flight = words->back();
+    if (words->size() == 2) options->world = words->front();
+    run = [options] { return fly(*options); };
+  });
+}
+
+}  // namespace tellurion::apps

@@ -1,0 +1,266 @@
+#include "globe/globe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <mutex>
+#include <numbers>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "cache/block_cache.h"
+#include "globe/height_tables.h"
+#include "globe/surface_worker.h"
+#include "globe/worker_pool.h"
+#include "source/gdal/gdal_source.h"
+
+namespace tellurion::globe {
+namespace {
+
+constexpr std::size_t kWaitingJobs = 64;
+
+int default_worker_count() {
+  // One core is left to the render thread and the embedding program.
+  return std::max(static_cast<int>(std::thread::hardware_concurrency()) - 1, 1);
+}
+
+bool is_drawn(LayerGroup group) {
+  return group == LayerGroup::height || group == LayerGroup::color || group == LayerGroup::grayscale;
+}
+
+source::SampleKind kind_of(LayerGroup group) {
+  if (group == LayerGroup::height) return source::SampleKind::height;
+  return group == LayerGroup::grayscale ? source::SampleKind::grey : source::SampleKind::colour;
+}
+
+}  // namespace
+
+source::GdalOptions gdal_options(const LayerSpec& layer) {
+  source::GdalOptions options;
+  options.path = layer.source.path.string();
+  options.kind = kind_of(layer.group);
+  options.crs = layer.source.crs;
+  options.vertical = layer.source.vertical;
+  options.no_data = layer.source.no_data;
+  options.scale = layer.source.scale;
+  options.offset = layer.source.offset;
+  options.rgb_bands = layer.source.bands;
+  return options;
+}
+
+std::filesystem::path default_cache_folder() {
+  if (const char* set = std::getenv("XDG_CACHE_HOME"); set && *set) return std::filesystem::path(set) / "tellurion";
+  if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache" / "tellurion";
+  return {};
+}
+
+struct Globe::State {
+  State(World w, const GlobeOptions& o)
+      : world(std::move(w)),
+        options(o),
+        // GDAL's own block cache takes a quarter of the budget.
+        blocks(o.memory_cache_bytes - o.memory_cache_bytes / 4) {}
+
+  World world;
+  GlobeOptions options;
+  cache::BlockCache blocks;
+  std::shared_ptr<const surface::SurfaceDescription> surface;
+  std::vector<LayerInfo> layers;
+
+  mutable std::mutex mutex;  ///< guards what follows
+  std::shared_ptr<const surface::SurfaceFacts> facts;
+  std::vector<SourceStats> sources;
+  bool missing = false;
+
+  std::vector<std::unique_ptr<SurfaceWorker>> workers;
+  std::unique_ptr<HeightTables> tables;
+  std::unique_ptr<WorkerPool> pool;  ///< last: its threads end before what they use
+
+  void open_layers();
+};
+
+void Globe::State::open_layers() {
+  auto description = std::make_shared<surface::SurfaceDescription>();
+  description->ellipsoid = world.ellipsoid;
+  for (const LayerSpec& spec : world.layers) {
+    LayerInfo info;
+    info.spec = spec;
+    SourceStats stats;
+    stats.name = spec.name;
+    if (spec.enabled && is_drawn(spec.group)) {
+      auto source = source::open_gdal(gdal_options(spec), world.ellipsoid);
+      if (source) {
+        surface::Layer layer;
+        layer.name = spec.name;
+        layer.source = std::move(*source);
+        layer.source_id = static_cast<std::uint32_t>(layers.size());
+        layer.opacity = static_cast<float>(spec.opacity);
+        layer.gamma = static_cast<float>(spec.gamma);
+        layer.multiplier = static_cast<float>(spec.multiplier);
+        layer.adds = spec.adds;
+        info.raster = layer.source;
+        (spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
+      } else {
+        stats.errors = 1;
+        stats.last_error = source.error().message;
+        info.error = source.error().message;
+        missing = true;
+      }
+    }
+    layers.push_back(std::move(info));
+    sources.push_back(std::move(stats));
+  }
+  // Groups draw in their order, whatever the file's.
+  std::stable_sort(description->colours.begin(), description->colours.end(), [&](const auto& a, const auto& b) {
+    return layers[a.source_id].spec.group < layers[b.source_id].spec.group;
+  });
+  description->revision = 1;
+  surface = std::move(description);
+}
+
+Globe::Globe(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Globe::~Globe() = default;
+
+Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& options) {
+  source::configure_gdal(options.memory_cache_bytes / 4);
+  auto state = std::make_unique<State>(std::move(world), options);
+  state->open_layers();
+  const int threads = options.workers < 0 ? default_worker_count() : options.workers;
+  std::unique_ptr<Globe> globe(new Globe(std::move(state)));
+  State& s = *globe->state_;
+  for (int i = 0; i < std::max(threads, 1); ++i) s.workers.push_back(std::make_unique<SurfaceWorker>(s.blocks));
+  s.pool = std::make_unique<WorkerPool>(threads, kWaitingJobs);
+  s.tables = std::make_unique<HeightTables>(s.surface, s.blocks, options.cache_folder, *s.pool,
+                                            [&s](std::shared_ptr<const surface::SurfaceFacts> facts) {
+                                              std::lock_guard lock(s.mutex);
+                                              s.facts = std::move(facts);
+                                            });
+  s.tables->start(options.scan_heights);
+  return globe;
+}
+
+const World& Globe::world() const { return state_->world; }
+const geo::Ellipsoid& Globe::ellipsoid() const { return state_->world.ellipsoid; }
+const std::vector<LayerInfo>& Globe::layers() const { return state_->layers; }
+
+std::vector<std::string> Globe::hints() const {
+  std::vector<std::string> hints;
+  for (const LayerInfo& layer : state_->layers) {
+    if (!layer.error.empty()) hints.push_back(layer.error);
+    if (!layer.raster) continue;
+    const auto& more = layer.raster->description().hints;
+    hints.insert(hints.end(), more.begin(), more.end());
+  }
+  return hints;
+}
+
+std::vector<SourceStats> Globe::source_stats() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->sources;
+}
+
+bool Globe::data_missing() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->missing;
+}
+
+std::size_t Globe::memory_cache_bytes() const { return state_->blocks.bytes() + source::gdal_cache_bytes(); }
+std::size_t Globe::memory_budget_bytes() const { return state_->options.memory_cache_bytes; }
+
+view::Pose Globe::home() const {
+  const double a = ellipsoid().a();
+  view::Pose pose;
+  const source::RasterDescription* finest = nullptr;
+  for (const LayerInfo& layer : state_->layers) {
+    if (!layer.raster) continue;
+    const auto& raster = layer.raster->description();
+    const bool regional = raster.bounds.north.value - raster.bounds.south.value < 1.0;
+    if (regional && (!finest || raster.spacing < finest->spacing)) finest = &raster;
+  }
+  if (!finest) {
+    pose.position = {to_radians(Degrees(20.0)), to_radians(Degrees(10.0)), EllipsoidalHeight(2.2 * a)};
+    return pose;
+  }
+  const auto& b = finest->bounds;
+  const double latitude = 0.5 * (b.south.value + b.north.value);
+  const double tall = (b.north.value - b.south.value) * a;
+  const double wide = std::min((b.east.value - b.west.value) * std::cos(latitude), std::numbers::pi / 2) * a;
+  // The default view is 45 degrees high and a good deal wider; a tenth of room all round.
+  const double height = 1.2 * std::max(tall, wide / 1.5) / (2.0 * std::tan(to_radians(Degrees(22.5)).value));
+  pose.position = {Radians(latitude), Radians(0.5 * (b.west.value + b.east.value)), EllipsoidalHeight(std::max(height, 100.0))};
+  return pose;
+}
+
+bool Globe::tables_ready() const { return state_->tables->ready(); }
+
+bool Globe::wait_for_tables(std::chrono::steady_clock::time_point deadline) {
+  while (!tables_ready()) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    if (!run_one()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+std::shared_ptr<const surface::SurfaceDescription> Globe::surface() const { return state_->surface; }
+
+std::shared_ptr<const surface::SurfaceFacts> Globe::facts() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->facts;
+}
+
+bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) {
+  State& s = *state_;
+  return s.pool->try_submit([&s, work = std::move(work)](int worker) { work(*s.workers[static_cast<std::size_t>(worker)]); });
+}
+
+bool Globe::run_one() { return state_->pool->run_one(); }
+int Globe::worker_count() const { return state_->pool->worker_count(); }
+
+void Globe::note_requests(std::span<const std::uint32_t> source_ids) {
+  std::lock_guard lock(state_->mutex);
+  for (const std::uint32_t id : source_ids) ++state_->sources[id].requests;
+}
+
+void Globe::note_error(std::string_view layer, const Error& error) {
+  std::lock_guard lock(state_->mutex);
+  state_->missing = true;
+  for (SourceStats& source : state_->sources) {
+    if (source.name != layer) continue;
+    ++source.errors;
+    source.last_error = error.message;
+  }
+}
+
+// --- Heights ---------------------------------------------------------------------------------------------------------
+
+struct HeightSampler::State {
+  surface::ElevationModel model;
+  double half_circumference = 0;
+};
+
+HeightSampler::HeightSampler(std::unique_ptr<State> state) : state_(std::move(state)) {}
+HeightSampler::HeightSampler(HeightSampler&&) noexcept = default;
+HeightSampler::~HeightSampler() = default;
+
+Result<HeightSampler> Globe::height_sampler() const {
+  auto model = surface::ElevationModel::open(state_->surface, state_->blocks);
+  if (!model) return model.error();
+  const double half_circumference = std::numbers::pi * ellipsoid().a();
+  return HeightSampler(std::make_unique<HeightSampler::State>(HeightSampler::State{std::move(*model), half_circumference}));
+}
+
+Result<HeightSampler::Answer> HeightSampler::height_at(const geo::LatLon& place, HeightLookup lookup, Metres wanted_spacing) {
+  const auto how = lookup == HeightLookup::nearest ? surface::Lookup::nearest : surface::Lookup::bilinear;
+  const auto found = state_->model.height_at(place, how, wanted_spacing.value);
+  if (!found) return found.error();
+  const bool known = std::isfinite(found->spacing);
+  return Answer{EllipsoidalHeight(found->metres), known ? std::log2(state_->half_circumference / found->spacing) : -1.0};
+}
+
+Result<geo::Vector<geo::Ecef>> HeightSampler::normal_at(const geo::LatLon& place, Metres wanted_spacing) {
+  return state_->model.surface_normal_at(place, wanted_spacing.value);
+}
+
+}  // namespace tellurion::globe

@@ -1,0 +1,119 @@
+// The front door: opens a world and keeps all that its views share: sources, decoded data, workers, error tables.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "geo/ellipsoid.h"
+#include "globe/frame_stats.h"
+#include "globe/world.h"
+#include "view/camera.h"
+
+namespace tellurion::cache { class BlockCache; }
+namespace tellurion::source { class RasterSource; }
+namespace tellurion::surface {
+struct SurfaceDescription;
+class SurfaceFacts;
+}
+
+namespace tellurion::globe {
+
+class SurfaceWorker;
+
+struct GlobeOptions {
+  std::size_t memory_cache_bytes = std::size_t{512} << 20;  ///< decoded data, GDAL's block cache included
+  int workers = -1;                                         ///< threads; 0: none, all on the calling thread; -1: by the machine
+  std::filesystem::path cache_folder;                       ///< for kept tables; empty: nothing is kept
+  bool scan_heights = true;                                 ///< make error tables in the background
+};
+
+/// Where caches are kept unless told otherwise: $XDG_CACHE_HOME/tellurion or ~/.cache/tellurion; empty if neither is set.
+std::filesystem::path default_cache_folder();
+
+enum class HeightLookup { nearest, bilinear };
+
+/// Heights out of the sources' own samples. Belongs to one thread; may read files.
+class HeightSampler {
+ public:
+  struct Answer {
+    EllipsoidalHeight height;
+    double level = 0;       ///< log2(half circumference / sample spacing) of the data that answered; -1: no data here, height 0
+  };
+  /// `wanted_spacing` in metres: the resolution to answer from; 0: the deepest.
+  Result<Answer> height_at(const geo::LatLon& place, HeightLookup lookup = HeightLookup::bilinear, Metres wanted_spacing = Metres(0));
+  /// Unit normal of the ground.
+  Result<geo::Vector<geo::Ecef>> normal_at(const geo::LatLon& place, Metres wanted_spacing = Metres(0));
+
+  HeightSampler(HeightSampler&&) noexcept;
+  ~HeightSampler();
+
+ private:
+  friend class Globe;
+  struct State;
+  explicit HeightSampler(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// A layer of an open world.
+struct LayerInfo {
+  LayerSpec spec;
+  std::shared_ptr<const source::RasterSource> raster;   ///< null: disabled, of a group that is not drawn, or not opened
+  std::string error;                                    ///< why it was not opened
+};
+
+/// A world that is open. Its functions are thread-safe unless they say otherwise.
+class Globe {
+ public:
+  /// Opens every enabled layer. A layer that cannot be opened is left out: see source_stats() and hints().
+  /// Errors: what makes the whole world useless.
+  static Result<std::unique_ptr<Globe>> open(World world, const GlobeOptions& options);
+  ~Globe();
+
+  const World& world() const;
+  const geo::Ellipsoid& ellipsoid() const;
+
+  /// A good first look: all of the layers' data if they are regional, else the whole body.
+  view::Pose home() const;
+
+  const std::vector<LayerInfo>& layers() const;
+
+  /// Sentences that a user should see: layers left out, data without a vertical datum.
+  std::vector<std::string> hints() const;
+  std::vector<SourceStats> source_stats() const;
+  /// Whether some data could not be read so far.
+  bool data_missing() const;
+  std::size_t memory_cache_bytes() const;
+  std::size_t memory_budget_bytes() const;
+
+  /// Error tables of the height sources: made in the background, kept in the cache folder.
+  bool tables_ready() const;
+  /// Waits for them (without threads: makes them here). False if `deadline` came first.
+  bool wait_for_tables(std::chrono::steady_clock::time_point deadline);
+
+  Result<HeightSampler> height_sampler() const;
+
+  // For the views of this globe.
+  std::shared_ptr<const surface::SurfaceDescription> surface() const;
+  std::shared_ptr<const surface::SurfaceFacts> facts() const;   ///< replaced when the tables are ready
+  /// Runs `work` on a worker with its own readers. False if too much waits; never waits itself.
+  bool try_submit(std::function<void(SurfaceWorker&)> work);
+  /// Without threads: runs a waiting job. False if there is none, or there are threads.
+  bool run_one();
+  int worker_count() const;
+  void note_requests(std::span<const std::uint32_t> source_ids);
+  void note_error(std::string_view layer, const Error& error);
+
+ private:
+  struct State;
+  explicit Globe(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tellurion::globe

@@ -1,0 +1,383 @@
+#include "globe/globe_view.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+#include <variant>
+
+#include <glm/geometric.hpp>
+
+#include "base/bounded_queue.h"
+#include "geo/sun.h"
+#include "globe/surface_worker.h"
+
+namespace tellurion::globe {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using surface::Part;
+
+constexpr double kFrameBudgetMs = 1000.0 / 30.0;
+constexpr std::chrono::seconds kRootDeadline{60};
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// What a worker made of a request.
+struct Finished {
+  geo::TileKey key;
+  Part part = Part::geometry;
+  std::variant<surface::TileGeometry, surface::TileImagery, Error> content;
+};
+
+using FinishedQueue = BoundedQueue<Finished>;
+
+/// The last height found under the eye; written by a worker, read by the render thread.
+struct GroundAnswer {
+  std::atomic<bool> known{false};
+  std::atomic<bool> asked{false};
+  std::atomic<double> metres{0.0};
+};
+
+render::FrameLook look_of(const ViewSettings& settings, const World& world, const view::Camera& camera) {
+  render::FrameLook look;
+  look.exaggeration = settings.exaggeration;
+  look.lighting = settings.lighting;
+  look.atmosphere = settings.atmosphere && world.planet == "Earth";
+  look.wireframe = settings.wireframe;
+  look.bounds = settings.bounds;
+  look.tile_borders = settings.tile_borders;
+  look.antialiasing = settings.antialiasing;
+  look.anisotropy = settings.anisotropy;
+  look.clear = settings.clear;
+  look.to_sun = light_direction(world, camera, settings.time);
+  return look;
+}
+
+surface::SelectionSettings selection_of(const ViewSettings& settings, std::size_t max_tiles) {
+  surface::SelectionSettings selection;
+  selection.sse_px = settings.sse_px;
+  selection.exaggeration = settings.exaggeration;
+  selection.metric = settings.lod;
+  selection.anisotropy = settings.anisotropy;
+  selection.max_tiles = max_tiles;
+  selection.transitions = settings.transitions;
+  selection.frozen = settings.frozen;
+  return selection;
+}
+
+}  // namespace
+
+geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& camera, const std::optional<UtcTime>& time) {
+  if (time) {
+    if (const auto sun = geo::direction_to_sun(world.planet, *time)) return *sun;
+  }
+  const geo::Geodetic below = geo::to_geodetic(world.ellipsoid, camera.eye);
+  const auto enu = geo::enu_at(world.ellipsoid, below);
+  return enu(geo::Vector<geo::Enu>{{-0.5, 0.5, std::sqrt(0.5)}});
+}
+
+struct GlobeView::State {
+  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()) {}
+
+  Globe& globe;
+  gpu::RenderThread& thread;
+  std::unique_ptr<render::Renderer> renderer;
+  surface::TileTree tree;
+  std::shared_ptr<const surface::SurfaceFacts> facts;
+  /// Room for all that can be in flight, so that no worker ever waits on it.
+  std::shared_ptr<FinishedQueue> finished;
+  std::shared_ptr<GroundAnswer> ground = std::make_shared<GroundAnswer>();
+  std::stop_source stop;
+  int in_flight = 0;
+  int max_in_flight = 0;
+  std::size_t max_tiles = 0;
+  Clock::time_point created = Clock::now();
+  const surface::Selection* selection = nullptr;
+  FrameStats stats;
+
+  void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
+  void ask(const geo::TileKey& key, Part part);
+  bool submit(const geo::TileKey& key, Part part);
+  void take_over(double upload_ms);
+  void take_over(Finished item);
+  Result<void> upload(const Finished& item);
+  bool make_room(Part part);
+  Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
+  Result<void> load_roots();
+};
+
+bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
+  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part,
+                           token = stop.get_token()](SurfaceWorker& worker) {
+    Finished item{key, part, {}};
+    if (part == Part::geometry) {
+      auto geometry = worker.build_geometry(surface, *facts, key, token);
+      if (geometry) item.content = std::move(*geometry);
+      else item.content = geometry.error();
+    } else {
+      auto imagery = worker.build_colour(surface, key, token);
+      if (imagery) item.content = std::move(*imagery);
+      else item.content = imagery.error();
+    }
+    queue->push(std::move(item));
+  });
+}
+
+void GlobeView::State::ask(const geo::TileKey& key, Part part) {
+  if (!submit(key, part)) return;
+  ++in_flight;
+  ++stats.requests;
+  tree.started(key, part);
+}
+
+bool GlobeView::State::make_room(Part part) {
+  const Part other = part == Part::geometry ? Part::colour : Part::geometry;
+  for (const Part p : {part, other}) {
+    if (const auto key = tree.eviction_candidate(p)) {
+      renderer->release(thread, *key, p);
+      tree.released(*key, p);
+      return true;
+    }
+  }
+  return false;
+}
+
+Result<void> GlobeView::State::upload(const Finished& item) {
+  for (;;) {
+    auto result = item.part == Part::geometry
+                      ? renderer->upload_geometry(thread, item.key, std::get<surface::TileGeometry>(item.content))
+                      : renderer->upload_colour(thread, item.key, std::get<surface::TileImagery>(item.content));
+    if (result || result.error().code != ErrorCode::exhausted || !make_room(item.part)) return result;
+  }
+}
+
+void GlobeView::State::take_over(Finished item) {
+  --in_flight;
+  Result<void> result;
+  if (const Error* error = std::get_if<Error>(&item.content)) result = *error;
+  else result = upload(item);
+  if (!result) {
+    const Error& error = result.error();
+    if (error.code == ErrorCode::cancelled) return tree.cancelled(item.key, item.part);
+    if (error.code == ErrorCode::exhausted) {
+      // More is wanted than fits: want less from now on.
+      max_tiles = std::max<std::size_t>(max_tiles - max_tiles / 16, 32);
+      return tree.cancelled(item.key, item.part);
+    }
+    const bool may_work_later = error.code == ErrorCode::unavailable;
+    return tree.failed(item.key, item.part, may_work_later ? Clock::now() + std::chrono::seconds(2) : Clock::time_point::max());
+  }
+  if (item.part == Part::geometry) {
+    const auto& geometry = std::get<surface::TileGeometry>(item.content);
+    tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
+  } else {
+    tree.arrived_colour(item.key);
+  }
+}
+
+void GlobeView::State::take_over(double upload_ms) {
+  const auto start = Clock::now();
+  while (auto item = finished->try_pop()) {
+    take_over(std::move(*item));
+    if (ms_since(start) > upload_ms) break;
+  }
+}
+
+void GlobeView::State::update(const view::Camera& camera, const ViewSettings& settings, double upload_ms) {
+  thread.empty_graveyard();
+  const auto start = Clock::now();
+  globe.run_one();
+  take_over(upload_ms);
+  stats.upload_ms = ms_since(start);
+
+  if (auto latest = globe.facts(); latest != facts) {
+    facts = std::move(latest);
+    tree.set_facts(facts);
+  }
+  const auto before_select = Clock::now();
+  selection = &tree.select(camera, selection_of(settings, max_tiles), before_select);
+  stats.select_ms = ms_since(before_select);
+
+  for (const surface::TileRequest& request : selection->requests) {
+    if (in_flight >= max_in_flight) break;
+    ask(request.key, request.part);
+  }
+
+  const surface::SelectionStats& s = selection->stats;
+  stats.time = std::chrono::duration<double>(start - created).count();
+  stats.tiles_visited = s.tiles_visited;
+  stats.tiles_selected = s.tiles_selected;
+  stats.tiles_selected_by_level = s.selected_by_level;
+  stats.tiles_drawn = s.tiles_drawn;
+  stats.tiles_drawn_by_level = s.drawn_by_level;
+  stats.tiles_waiting = s.tiles_waiting;
+  stats.max_error_px = s.max_error_px;
+  stats.complete = s.complete && globe.tables_ready();
+  stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
+  stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
+  stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
+  stats.draw_ms = 0;
+  stats.draws = 0;
+  stats.triangles = 0;
+  stats.frame_ms = ms_since(start);
+}
+
+Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& key) {
+  auto nothing = std::make_shared<surface::SurfaceDescription>();
+  nothing->ellipsoid = globe.ellipsoid();
+  cache::BlockCache no_blocks(0);
+  SurfaceWorker worker(no_blocks);
+  return worker.build_geometry(std::move(nothing), *facts, key, {});
+}
+
+Result<void> GlobeView::State::load_roots() {
+  const auto deadline = Clock::now() + kRootDeadline;
+  // Twelve jobs; without threads they run here.
+  int missing = 0;
+  for (const Part part : {Part::geometry, Part::colour}) {
+    for (int face = 0; face < geo::kFaceCount; ++face) {
+      const geo::TileKey root{static_cast<std::uint8_t>(face), 0, 0, 0};
+      while (!submit(root, part)) {
+        if (!globe.run_one()) std::this_thread::yield();
+      }
+      tree.started(root, part);
+      ++in_flight;
+      ++missing;
+    }
+  }
+  while (missing > 0) {
+    globe.run_one();
+    auto item = finished->pop_until(std::min(deadline, Clock::now() + std::chrono::milliseconds(20)));
+    if (!item) {
+      if (Clock::now() >= deadline)
+        return Error{ErrorCode::unavailable, "the planet's coarsest tiles did not load within a minute: are its files on a slow disk?"};
+      continue;
+    }
+    --missing;
+    if (item->part == Part::geometry && std::holds_alternative<Error>(item->content)) {
+      // Unreadable heights must not leave a hole: a bare ellipsoid stands in.
+      auto bare = build_bare(item->key);
+      if (!bare) return bare.error();
+      item->content = std::move(*bare);
+    }
+    take_over(std::move(*item));
+  }
+  return {};
+}
+
+GlobeView::GlobeView(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+GlobeView::~GlobeView() {
+  if (!state_) return;
+  state_->stop.request_stop();
+  state_->finished->close();
+}
+
+Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderThread& thread, std::size_t gpu_budget_bytes) {
+  auto state = std::make_unique<State>(globe, thread);
+  render::RendererOptions options;
+  options.ellipsoid = globe.ellipsoid();
+  options.gpu_budget_bytes = gpu_budget_bytes;
+  auto renderer = render::Renderer::create(thread, options);
+  if (!renderer) return renderer.error();
+  state->renderer = std::move(*renderer);
+  // Tiles of a picture at most: what fits if each has an own colour slot with mips, slopes and a middling mesh.
+  constexpr std::size_t kMiddlingTile = (342u << 10) + (86u << 10) + (80u << 10);
+  state->max_tiles = std::max<std::size_t>(gpu_budget_bytes / kMiddlingTile, 48);
+  state->max_in_flight = std::max(2 * std::max(globe.worker_count(), 1), 4);
+  state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
+  state->facts = globe.facts();
+  if (auto roots = state->load_roots(); !roots) return roots.error();
+  return std::unique_ptr<GlobeView>(new GlobeView(std::move(state)));
+}
+
+const FrameStats& GlobeView::update(const view::Camera& camera, const ViewSettings& settings, double upload_ms) {
+  state_->update(camera, settings, upload_ms);
+  return state_->stats;
+}
+
+const FrameStats& GlobeView::draw(const view::Camera& camera, const ViewSettings& settings, unsigned framebuffer, double upload_ms) {
+  State& s = *state_;
+  const auto start = Clock::now();
+  s.update(camera, settings, upload_ms);
+  const auto before_draw = Clock::now();
+  const auto figures = s.renderer->draw(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw, framebuffer);
+  s.stats.draw_ms = ms_since(before_draw);
+  s.stats.draws = figures.draws;
+  s.stats.triangles = figures.triangles;
+  s.stats.frame_ms = ms_since(start);
+  ++s.stats.frame;
+  if (s.stats.frame_ms > kFrameBudgetMs) ++s.stats.frames_over_budget;
+  return s.stats;
+}
+
+bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings, Clock::time_point deadline) {
+  State& s = *state_;
+  if (!s.globe.wait_for_tables(deadline)) return false;
+  constexpr double kNoLimit = 1e9;
+  for (;;) {
+    s.update(camera, settings, kNoLimit);
+    if (s.stats.complete) return true;
+    if (s.in_flight == 0 && s.selection->requests.empty()) return false;  // the rest has failed for good
+    const auto now = Clock::now();
+    if (now >= deadline) return false;
+    if (s.globe.run_one()) continue;
+    if (auto item = s.finished->pop_until(std::min(deadline, now + std::chrono::milliseconds(50)))) s.take_over(std::move(*item));
+  }
+}
+
+raster::Image GlobeView::picture(const view::Camera& camera, const ViewSettings& settings) {
+  State& s = *state_;
+  s.selection = &s.tree.select(camera, selection_of(settings, s.max_tiles), Clock::now());
+  return s.renderer->picture(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
+}
+
+render::GeoPicture GlobeView::measure(const view::Camera& camera, const ViewSettings& settings) {
+  State& s = *state_;
+  s.selection = &s.tree.select(camera, selection_of(settings, s.max_tiles), Clock::now());
+  return s.renderer->measure(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
+}
+
+std::optional<geo::Point<geo::Ecef>> GlobeView::pick(const view::Camera& camera, glm::dvec2 pixel, const ViewSettings& settings) {
+  State& s = *state_;
+  if (!s.selection) return std::nullopt;
+  // A picture of one pixel that looks along the ray.
+  const glm::dvec3 direction = camera.ray(pixel).xyz;
+  view::Camera narrow = camera;
+  const glm::dvec3 right = glm::normalize(glm::cross(direction, camera.axes[1]));
+  narrow.axes = glm::dmat3(right, glm::cross(right, direction), -direction);
+  narrow.vertical_fov = Radians(camera.pixel_angle());
+  narrow.width = narrow.height = 1;
+  const auto seen = s.renderer->measure(s.thread, narrow, look_of(settings, s.globe.world(), camera), s.selection->draw);
+  if (!(seen.distance.front() > 0.0)) return std::nullopt;
+  return camera.eye + geo::Vector<geo::Ecef>{direction * seen.distance.front()};
+}
+
+std::optional<EllipsoidalHeight> GlobeView::ground_below(const view::Camera& camera) {
+  State& s = *state_;
+  auto answer = s.ground;
+  if (!answer->asked.exchange(true)) {
+    const geo::LatLon place = geo::place_of(geo::to_geodetic(s.globe.ellipsoid(), camera.eye));
+    const bool submitted = s.globe.try_submit([answer, place, surface = s.globe.surface()](SurfaceWorker& worker) {
+      if (const auto model = worker.elevation(surface)) {
+        if (const auto height = (*model)->height_at(place, surface::Lookup::bilinear)) {
+          answer->metres = height->metres;
+          answer->known = true;
+        }
+      }
+      answer->asked = false;
+    });
+    if (!submitted) answer->asked = false;
+  }
+  if (!answer->known) return std::nullopt;
+  return EllipsoidalHeight(answer->metres);
+}
+
+const FrameStats& GlobeView::stats() const { return state_->stats; }
+gpu::RenderThread& GlobeView::thread() { return state_->thread; }
+render::Renderer& GlobeView::renderer() { return *state_->renderer; }
+
+}  // namespace tellurion::globe

@@ -1,0 +1,140 @@
+#include "globe/height_tables.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <mutex>
+#include <stop_token>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/log.h"
+#include "surface/error_scan.h"
+#include "surface/error_table.h"
+#include "surface/surface_facts_made.h"
+
+namespace tellurion::globe {
+namespace {
+
+/// FNV-1a, 64 bits: the name of a kept table.
+std::uint64_t hash_of(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
+  return hash;
+}
+
+}  // namespace
+
+struct HeightTables::State {
+  std::shared_ptr<const surface::SurfaceDescription> surface;
+  std::shared_ptr<const surface::SurfaceDescription> scanned;
+  cache::BlockCache* blocks = nullptr;
+  WorkerPool* pool = nullptr;
+  Publish publish;
+  std::filesystem::path file;  ///< empty: not kept
+  std::string revision;
+  std::stop_source stop;
+  std::atomic<bool> ready{false};
+
+  std::mutex mutex;  ///< guards what follows
+  std::vector<surface::ElevationModel> idle_models;
+  std::vector<surface::SubtreeScan> scans;
+  std::size_t unfinished = 0;
+  bool failed = false;
+
+  Result<surface::ElevationModel> take_model();
+  void run(std::size_t job, const geo::TileKey& root);
+  void finish();
+};
+
+Result<surface::ElevationModel> HeightTables::State::take_model() {
+  {
+    std::lock_guard lock(mutex);
+    if (!idle_models.empty()) {
+      surface::ElevationModel model = std::move(idle_models.back());
+      idle_models.pop_back();
+      return model;
+    }
+  }
+  return surface::ElevationModel::open(scanned, *blocks);
+}
+
+void HeightTables::State::run(std::size_t job, const geo::TileKey& root) {
+  auto model = take_model();
+  Result<surface::SubtreeScan> scan = model ? surface::scan_subtree(*model, root, stop.get_token()) : model.error();
+  bool last = false;
+  {
+    std::lock_guard lock(mutex);
+    if (model) idle_models.push_back(std::move(*model));
+    if (scan) {
+      scans[job] = std::move(*scan);
+    } else {
+      const bool told = std::exchange(failed, true);
+      if (!told && scan.error().code != ErrorCode::cancelled)
+        log::warning(fmt::format("{}; levels are chosen by estimates", scan.error().message));
+    }
+    last = --unfinished == 0;
+  }
+  if (last) finish();
+}
+
+void HeightTables::State::finish() {
+  std::vector<surface::SubtreeScan> found;
+  {
+    std::lock_guard lock(mutex);
+    found = std::move(scans);
+    idle_models.clear();
+  }
+  if (!failed) {
+    auto table = std::make_shared<const surface::ErrorTable>(surface::merge_scans(found));
+    if (!file.empty()) {
+      std::error_code failure;
+      std::filesystem::create_directories(file.parent_path(), failure);
+      if (const auto saved = table->save(file, revision); !saved) log::warning(saved.error().message);
+    }
+    publish(surface::make_facts(surface, std::move(table)));
+  }
+  ready = true;
+}
+
+HeightTables::HeightTables(std::shared_ptr<const surface::SurfaceDescription> surface, cache::BlockCache& blocks,
+                           std::filesystem::path cache_folder, WorkerPool& pool, Publish publish)
+    : state_(std::make_shared<State>()) {
+  State& s = *state_;
+  s.scanned = std::make_shared<const surface::SurfaceDescription>(surface::scanned_part(*surface));
+  s.surface = std::move(surface);
+  s.blocks = &blocks;
+  s.pool = &pool;
+  s.publish = std::move(publish);
+  s.revision = surface::table_revision(*s.surface);
+  if (!cache_folder.empty()) s.file = cache_folder / "tables" / fmt::format("{:016x}.errors", hash_of(s.revision));
+}
+
+HeightTables::~HeightTables() { state_->stop.request_stop(); }
+
+void HeightTables::start(bool scan) {
+  State& s = *state_;
+  if (!s.file.empty()) {
+    if (auto kept = surface::ErrorTable::load(s.file, s.revision)) {
+      s.publish(surface::make_facts(s.surface, std::make_shared<const surface::ErrorTable>(std::move(*kept))));
+      s.ready = true;
+      return;
+    }
+  }
+  s.publish(surface::make_facts(s.surface, nullptr));
+  if (!scan) {
+    s.ready = true;
+    return;
+  }
+  const std::vector<geo::TileKey> jobs = surface::scan_jobs();
+  s.scans.resize(jobs.size());
+  s.unfinished = jobs.size();
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    s.pool->submit_background([state = state_, i, root = jobs[i]](int) { state->run(i, root); });
+  }
+}
+
+bool HeightTables::ready() const { return state_->ready; }
+
+}  // namespace tellurion::globe

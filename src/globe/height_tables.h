@@ -1,0 +1,36 @@
+// The error tables of a surface's height layers: loaded if they were kept, else made in the background and kept.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "cache/block_cache.h"
+#include "globe/worker_pool.h"
+#include "surface/elevation_model.h"
+#include "surface/surface_facts.h"
+
+namespace tellurion::globe {
+
+class HeightTables {
+ public:
+  using Publish = std::function<void(std::shared_ptr<const surface::SurfaceFacts>)>;
+
+  /// `publish` gets facts at once (safe estimates, or those of a kept table) and again when the table is made, on any thread.
+  /// `blocks` and `pool` outlive the jobs.
+  HeightTables(std::shared_ptr<const surface::SurfaceDescription> surface, cache::BlockCache& blocks,
+               std::filesystem::path cache_folder, WorkerPool& pool, Publish publish);
+  ~HeightTables();
+
+  /// Loads or begins to make the table; does not wait. With `scan` false the estimates stay.
+  void start(bool scan);
+  /// Whether the facts are final.
+  bool ready() const;
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace tellurion::globe

@@ -1,0 +1,282 @@
+#include "globe/world.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <initializer_list>
+#include <limits>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include "geo/body.h"
+
+namespace tellurion::globe {
+namespace {
+
+constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
+
+/// Reads the tables of one world file; the first mistake is kept, what follows it is ignored.
+class WorldReader {
+ public:
+  WorldReader(std::filesystem::path folder, std::string name) : folder_(std::move(folder)), name_(std::move(name)) {}
+
+  Result<World> read(const toml::table& root) {
+    World world;
+    expect_keys(root, "the file", {"planet", "layer"});
+    if (const toml::node* planet = root.get("planet")) {
+      if (const toml::table* table = planet->as_table()) read_planet(*table, world);
+      else fail(*planet, "`planet` must be a table: [planet]");
+    }
+    if (const toml::node* layers = root.get("layer")) {
+      const toml::array* list = layers->as_array();
+      if (!list) fail(*layers, "layers are written as [[layer]], with two brackets");
+      for (std::size_t i = 0; list && i < list->size(); ++i) {
+        const toml::table* table = (*list)[i].as_table();
+        if (table) world.layers.push_back(read_layer(*table));
+        else fail((*list)[i], "layers are written as [[layer]], with two brackets");
+      }
+    }
+    if (error_) return *error_;
+    return world;
+  }
+
+ private:
+  void read_planet(const toml::table& table, World& world) {
+    expect_keys(table, "[planet]", {"name", "radii"});
+    const toml::node* radii = table.get("radii");
+    world.planet = text(table, "name").value_or(radii ? "custom" : "Earth");
+    if (radii) {
+      const toml::array* pair = radii->as_array();
+      if (!pair || pair->size() != 2 || !pair->get(0)->is_number() || !pair->get(1)->is_number())
+        return fail(*radii, "`radii` must be [equatorial, polar] in metres");
+      const double a = pair->get(0)->value<double>().value_or(0.0);
+      const double b = pair->get(1)->value<double>().value_or(0.0);
+      if (!(b > 0.0 && a >= b && a < 1e10 && b > 0.5 * a))
+        return fail(*radii, "`radii` must be [equatorial, polar] in metres, the polar one from half to all of the equatorial one");
+      world.ellipsoid = {Metres(a), Metres(b)};
+    } else if (const auto body = geo::find_body(world.planet)) {
+      world.ellipsoid = body->ellipsoid;
+    } else {
+      fail(*table.get("name"), fmt::format("no body is known as \"{}\": give its radii = [equatorial, polar] in metres", world.planet));
+    }
+  }
+
+  LayerSpec read_layer(const toml::table& table) {
+    LayerSpec layer;
+    layer.line = line_of(table);
+    expect_keys(table, "[[layer]]",
+                {"name", "group", "source", "opacity", "gamma", "multiplier", "enabled", "mode"});
+    const auto group = text(table, "group");
+    if (!group) {
+      fail(table, "the layer has no `group`");
+    } else if (const auto* found = std::find(std::begin(kGroupNames), std::end(kGroupNames), *group);
+               found != std::end(kGroupNames)) {
+      layer.group = static_cast<LayerGroup>(found - std::begin(kGroupNames));
+    } else {
+      fail(*table.get("group"), fmt::format("no group is called \"{}\": it is one of {}", *group, fmt::join(kGroupNames, ", ")));
+    }
+    layer.opacity = number(table, "opacity", 0.0, 1.0).value_or(1.0);
+    layer.gamma = number(table, "gamma", 0.01, 100.0).value_or(1.0);
+    layer.multiplier = number(table, "multiplier", -1e6, 1e6).value_or(1.0);
+    layer.enabled = flag(table, "enabled").value_or(true);
+    if (const auto mode = text(table, "mode")) {
+      if (*mode == "add" && layer.group == LayerGroup::height) layer.adds = true;
+      else if (*mode != "replace") fail(*table.get("mode"), "`mode` is \"replace\", or for height layers \"add\"");
+    }
+    if (const toml::node* source = table.get("source")) {
+      if (const toml::table* s = source->as_table()) read_source(*s, layer.source);
+      else fail(*source, "`source` must be a table: source = { type = \"gdal\", path = \"...\" }");
+    } else {
+      fail(table, "the layer has no `source`");
+    }
+    layer.name = text(table, "name").value_or(layer.source.path.stem().string());
+    return layer;
+  }
+
+  void read_source(const toml::table& table, SourceSpec& source) {
+    source.type = text(table, "type").value_or("gdal");
+    if (source.type != "gdal") {
+      return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
+                  fmt::format("this build reads sources of type \"gdal\" only, not \"{}\"", source.type), ErrorCode::unsupported);
+    }
+    expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    if (const auto path = text(table, "path"); path && !path->empty()) {
+      source.path = (folder_ / *path).lexically_normal();
+    } else {
+      fail(table, "the source has no `path`");
+    }
+    source.crs = text(table, "crs");
+    source.vertical = text(table, "vertical");
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    source.no_data = number(table, "no_data", -kAny, kAny);
+    source.scale = number(table, "scale", -1e12, 1e12);
+    source.offset = number(table, "offset", -1e12, 1e12);
+    if (const toml::node* bands = table.get("bands")) {
+      std::array<int, 3> rgb{};
+      const toml::array* list = bands->as_array();
+      bool good = list && list->size() == 3;
+      for (std::size_t i = 0; good && i < 3; ++i) {
+        const auto band = (*list)[i].value<std::int64_t>();
+        good = band && *band >= 1 && *band <= 65536;
+        if (good) rgb[i] = static_cast<int>(*band);
+      }
+      if (good) source.bands = rgb;
+      else fail(*bands, "`bands` must be [red, green, blue], numbers from 1");
+    }
+  }
+
+  std::optional<std::string> text(const toml::table& table, std::string_view key) {
+    const toml::node* node = table.get(key);
+    if (!node) return std::nullopt;
+    auto value = node->value_exact<std::string>();
+    if (!value) fail(*node, fmt::format("`{}` must be text in quotes", key));
+    return value;
+  }
+
+  std::optional<double> number(const toml::table& table, std::string_view key, double least, double most) {
+    const toml::node* node = table.get(key);
+    if (!node) return std::nullopt;
+    const auto value = node->is_number() ? node->value<double>() : std::nullopt;
+    if (!value || !(*value >= least && *value <= most)) {
+      fail(*node, fmt::format("`{}` must be a number from {} to {}", key, least, most));
+      return std::nullopt;
+    }
+    return value;
+  }
+
+  std::optional<bool> flag(const toml::table& table, std::string_view key) {
+    const toml::node* node = table.get(key);
+    if (!node) return std::nullopt;
+    auto value = node->value_exact<bool>();
+    if (!value) fail(*node, fmt::format("`{}` must be true or false", key));
+    return value;
+  }
+
+  void expect_keys(const toml::table& table, std::string_view where, std::initializer_list<std::string_view> known) {
+    for (const auto& [key, node] : table) {
+      if (std::find(known.begin(), known.end(), key.str()) == known.end())
+        fail(node, fmt::format("{} has no key `{}`; it knows {}", where, key.str(), fmt::join(known, ", ")));
+    }
+  }
+
+  static int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
+
+  void fail(const toml::node& node, std::string_view what, ErrorCode code = ErrorCode::invalid_argument) {
+    if (!error_) error_ = Error{code, fmt::format("{}:{}: {}", name_, line_of(node), what)};
+  }
+
+  std::filesystem::path folder_;
+  std::string name_;
+  std::optional<Error> error_;
+};
+
+toml::table source_table(const SourceSpec& source, const std::filesystem::path& folder) {
+  toml::table table;
+  table.is_inline(true);
+  table.insert("type", source.type);
+  const auto relative = source.path.lexically_relative(folder);
+  const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
+  table.insert("path", (inside ? relative : source.path).generic_string());
+  if (source.crs) table.insert("crs", *source.crs);
+  if (source.vertical) table.insert("vertical", *source.vertical);
+  if (source.no_data) table.insert("no_data", *source.no_data);
+  if (source.scale) table.insert("scale", *source.scale);
+  if (source.offset) table.insert("offset", *source.offset);
+  if (source.bands) {
+    const auto& b = *source.bands;
+    table.insert("bands", toml::array{b[0], b[1], b[2]});
+  }
+  return table;
+}
+
+}  // namespace
+
+std::string_view name_of(LayerGroup group) { return kGroupNames[static_cast<std::size_t>(group)]; }
+
+Result<World> parse_world(std::string_view text, const std::filesystem::path& folder, const std::string& name) {
+  try {
+    const toml::table root = toml::parse(text, name);
+    return WorldReader(folder, name).read(root);
+  } catch (const toml::parse_error& error) {
+    return Error{ErrorCode::corrupt,
+                 fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description())};
+  }
+}
+
+Result<World> load_world(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kLargest = 16u << 20;
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(file, failure))
+    return Error{ErrorCode::not_found, fmt::format("{}: there is no such world file", file.string())};
+  if (std::filesystem::file_size(file, failure) > kLargest)
+    return Error{ErrorCode::unsupported, fmt::format("{}: a world file has at most 16 MB", file.string())};
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) return Error{ErrorCode::unavailable, fmt::format("{}: cannot be read", file.string())};
+  const auto absolute = std::filesystem::absolute(file, failure);
+  auto world = parse_world(text.str(), absolute.parent_path(), file.string());
+  if (world) world->file = absolute;
+  return world;
+}
+
+std::string to_toml(const World& world) {
+  toml::table planet;
+  planet.insert("name", world.planet);
+  const auto body = geo::find_body(world.planet);
+  if (!body || !(body->ellipsoid == world.ellipsoid))
+    planet.insert("radii", toml::array{world.ellipsoid.a(), world.ellipsoid.b()});
+  toml::array layers;
+  for (const LayerSpec& layer : world.layers) {
+    toml::table table;
+    table.insert("name", layer.name);
+    table.insert("group", std::string(name_of(layer.group)));
+    table.insert("source", source_table(layer.source, world.file.parent_path()));
+    if (layer.opacity != 1.0) table.insert("opacity", layer.opacity);
+    if (layer.gamma != 1.0) table.insert("gamma", layer.gamma);
+    if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
+    if (!layer.enabled) table.insert("enabled", false);
+    if (layer.adds) table.insert("mode", "add");
+    layers.push_back(std::move(table));
+  }
+  std::ostringstream out;
+  out << toml::table{{"planet", std::move(planet)}, {"layer", std::move(layers)}} << "\n";
+  return out.str();
+}
+
+Result<void> save_world(const World& world, const std::filesystem::path& file) {
+  World placed = world;
+  std::error_code failure;
+  placed.file = std::filesystem::absolute(file, failure);
+  const std::filesystem::path part = file.string() + ".part";
+  {
+    std::ofstream stream(part, std::ios::binary);
+    stream << to_toml(placed);
+    if (!stream.flush())
+      return Error{ErrorCode::unavailable, fmt::format("{}: cannot be written; is the folder there and writable?", file.string())};
+  }
+  std::filesystem::rename(part, file, failure);
+  if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", file.string(), failure.message())};
+  return {};
+}
+
+Result<std::filesystem::path> default_data_folder() {
+  std::vector<std::filesystem::path> places;
+  if (const char* set = std::getenv("TELLURION_DATA_DIR")) places.emplace_back(std::filesystem::path(set) / "earth");
+  std::error_code failure;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", failure);
+  if (!failure) places.push_back(program.parent_path().parent_path() / "share/tellurion/earth");
+  places.emplace_back(std::filesystem::path(TELLURION_SOURCE_DATA_DIR) / "earth");
+  std::string looked;
+  for (const auto& place : places) {
+    if (std::filesystem::exists(place / "world.toml", failure)) return place;
+    looked += (looked.empty() ? "" : ", ") + place.string();
+  }
+  return Error{ErrorCode::not_found,
+               fmt::format("the default world is not there (looked in {}): set TELLURION_DATA_DIR to the folder that holds it", looked)};
+}
+
+}  // namespace tellurion::globe

@@ -1,0 +1,75 @@
+// What a globe is made of, as text: the planet, its layers in order, their sources.
+// Format: docs/world-file.md
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "geo/ellipsoid.h"
+
+namespace tellurion::globe {
+
+/// The groups in the order in which they are drawn.
+enum class LayerGroup { height, color, grayscale, grayscale_overlay, water, night, overlay };
+
+/// The group's name in world files.
+std::string_view name_of(LayerGroup group);
+
+/// Where a layer's data come from. `path` is absolute once a world is loaded.
+struct SourceSpec {
+  std::string type = "gdal";
+  std::filesystem::path path;
+  std::optional<std::string> crs;
+  std::optional<std::string> vertical;
+  std::optional<double> no_data;
+  std::optional<double> scale;
+  std::optional<double> offset;
+  std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
+};
+
+struct LayerSpec {
+  std::string name;
+  LayerGroup group = LayerGroup::color;
+  SourceSpec source;
+  double opacity = 1.0;
+  double gamma = 1.0;
+  double multiplier = 1.0;
+  bool enabled = true;
+  bool adds = false;   ///< height layers: added to the ones below instead of replacing them
+  int line = 0;        ///< where it stands in the world file; 0 if it does not
+};
+
+struct World {
+  std::string planet = "Earth";
+  geo::Ellipsoid ellipsoid = geo::kWgs84;
+  std::vector<LayerSpec> layers;   ///< in each group the later lie over the earlier
+  std::filesystem::path file;      ///< empty if it was not read from a world file
+};
+
+/// Reads a world file. Errors name the file and the line: not_found, corrupt (no TOML), invalid_argument (an unknown key,
+/// a wrong type or value), unsupported (a source type that this build lacks).
+Result<World> load_world(const std::filesystem::path& file);
+
+/// The same from text; relative paths are taken from `folder`, errors name `name`.
+Result<World> parse_world(std::string_view text, const std::filesystem::path& folder, const std::string& name);
+
+/// The world as TOML; parse_world gives the same world back.
+std::string to_toml(const World& world);
+
+/// Writes `world` to `file`, whole or not at all. Errors: unavailable.
+Result<void> save_world(const World& world, const std::filesystem::path& file);
+
+/// The folder with the embedded default world: $TELLURION_DATA_DIR, else beside the program, else where it was built.
+/// Errors: not_found, naming the places looked at.
+Result<std::filesystem::path> default_data_folder();
+
+/// What a command line's WORLD means: nothing is the default world, *.toml a world file, anything else a raster: shown on the
+/// body that its CRS names, over the default world's layers if that is the Earth.
+Result<World> resolve_world(const std::string& argument);
+
+}  // namespace tellurion::globe

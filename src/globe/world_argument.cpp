@@ -1,0 +1,78 @@
+// What a command line's WORLD means.
+#include "globe/world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "geo/body.h"
+#include "source/gdal/raster_body.h"
+
+namespace tellurion::globe {
+namespace {
+
+/// The known body whose equatorial radius is nearest, if it is within a hundredth.
+const geo::Body* body_like(const geo::Ellipsoid& ellipsoid) {
+  const geo::Body* best = nullptr;
+  double least = 0.01;
+  for (const geo::Body& body : geo::bodies()) {
+    const double difference = std::abs(ellipsoid.a() / body.ellipsoid.a() - 1.0);
+    if (difference < least) {
+      least = difference;
+      best = &body;
+    }
+  }
+  return best;
+}
+
+LayerGroup group_of(source::SampleKind kind) {
+  switch (kind) {
+    case source::SampleKind::height: return LayerGroup::height;
+    case source::SampleKind::grey: return LayerGroup::grayscale;
+    case source::SampleKind::colour: break;
+  }
+  return LayerGroup::color;
+}
+
+Result<World> default_world() {
+  auto folder = default_data_folder();
+  if (!folder) return folder.error();
+  return load_world(*folder / "world.toml");
+}
+
+/// A raster shown for itself: on its own body; on Earth over the default world.
+Result<World> world_of_raster(const std::filesystem::path& file) {
+  const auto raster = source::body_of_raster(file);
+  if (!raster) return raster.error();
+  const geo::Body* body = body_like(raster->ellipsoid);
+  World world;
+  world.planet = body ? std::string(body->name) : "unknown body";
+  world.ellipsoid = raster->ellipsoid;
+  if (world.planet == "Earth") {
+    auto below = default_world();
+    if (!below) return below.error();
+    world = std::move(*below);
+    world.file.clear();
+  }
+  LayerSpec layer;
+  layer.name = file.filename().string();
+  layer.group = group_of(raster->kind);
+  std::error_code failure;
+  layer.source.path = std::filesystem::absolute(file, failure).lexically_normal();
+  world.layers.push_back(std::move(layer));
+  return world;
+}
+
+}  // namespace
+
+Result<World> resolve_world(const std::string& argument) {
+  if (argument.empty()) return default_world();
+  if (argument.find("://") != std::string::npos)
+    return Error{ErrorCode::unsupported, fmt::format("{}: this build reads no network sources: give a world file or a raster", argument)};
+  const std::filesystem::path file(argument);
+  if (file.extension() == ".toml") return load_world(file);
+  return world_of_raster(file);
+}
+
+}  // namespace tellurion::globe
