@@ -14,7 +14,7 @@ float depth_to_space(vec3 p, vec3 d) {
   float density = exp((1.0 - r) / air_scale.w);
   float up = c / ((c - 1.0) * abs(mu) + 1.0);
   if (mu >= 0.0) return density * up * air_scale.w;
-  float lowest = sqrt(max(1.0 - mu * mu, 0.0)) * x;  // the ray's closest point to the centre
+  float lowest = max(sqrt(max(1.0 - mu * mu, 0.0)) * x, 1.0);  // the ray's closest point to the centre
   float through = 2.0 * sqrt(0.5 * kPi * lowest) * exp(min((1.0 / air_scale.w) - lowest, 40.0));
   return (through - density * up) * air_scale.w;
 }

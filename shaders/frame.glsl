@@ -10,5 +10,4 @@ layout(std140) uniform Frame {
   vec4 sky_north;           // w: highest angle
   vec4 sky_up;              // w: radius of the atmosphere's top
   vec4 clear_colour;        // rgb encoded
-  vec4 viewport;            // xy: pixels
 };

@@ -41,7 +41,7 @@ void main() {
 #ifdef LOG_DEPTH
   gl_FragDepth = log2(1.0 + 1.0 / gl_FragCoord.w) / 40.0;
 #ifdef WIREFRAME
-  gl_FragDepth *= 1.0 - 1e-5;
+  gl_FragDepth -= 7e-5;  // nearer by 0.002 of the distance
 #endif
 #endif
 

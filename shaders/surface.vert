@@ -42,8 +42,8 @@ void main() {
   vec3 relative = (a_base + u_tile[0].xyz) + u_tile[1].xyz + displaced;
   gl_Position = clip_from_relative * vec4(relative, 1.0);
 
-#ifdef WIREFRAME
-  gl_Position.z -= gl_Position.w * u_tile[7].y;  // a little nearer than the surface
+#if defined(WIREFRAME) && !defined(LOG_DEPTH)
+  gl_Position.z *= 1.002;  // a little nearer than the surface
 #endif
   v_colour_uv = a_st * u_tile[4].x + u_tile[4].yz;
 #ifdef FADE

@@ -45,11 +45,18 @@ Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
     const auto program = programs.variant(thread, features);
     if (!program) return program.error();
   }
-  return Compositor(thread, std::move(programs));
+  gpu::ProgramFamily reduce({shader_texts({"reduce.vert"}), shader_texts({"reduce.frag"}), {}, {"u_layer"}, {"u_slots"}, {}});
+  if (const auto program = reduce.variant(thread, 0); !program) return program.error();
+  return Compositor(thread, std::move(programs), std::move(reduce));
 }
 
-Compositor::Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs)
-    : programs_(std::move(programs)), array_(thread), cells_(thread), target_(thread), source_(thread) {
+Compositor::Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs, gpu::ProgramFamily reduce_programs)
+    : programs_(std::move(programs)),
+      reduce_programs_(std::move(reduce_programs)),
+      array_(thread),
+      no_array_(thread),
+      cells_(thread),
+      target_(thread) {
   scratch_.reserve(kMaxScratch + 1);
   glBindVertexArray(array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, cells_.name());
@@ -82,8 +89,7 @@ Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const Imag
     if (auto drawn = draw(thread, *patch, budget); !drawn) return drawn;
   }
   glDisable(GL_BLEND);
-  make_levels(pool, slot);
-  return {};
+  return make_levels(thread, pool, slot);
 }
 
 Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch, Budget& budget) {
@@ -168,20 +174,29 @@ void Compositor::upload_cells(const ImagePatch& patch) {
                GL_STREAM_DRAW);
 }
 
-void Compositor::make_levels(const SlotPool& pool, Slot slot) {
-  // A chain of blits: glGenerateMipmap would make the levels of the whole array.
-  const unsigned texture = pool.texture(slot);
-  const auto layer = static_cast<GLint>(slot.layer);
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, source_.name());
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_.name());
+Result<void> Compositor::make_levels(gpu::RenderThread& thread, const SlotPool& pool, Slot slot) {
+  // Not glGenerateMipmap: that would make the levels of the whole array.
+  const auto program = reduce_programs_.variant(thread, 0);
+  if (!program) return program.error();
+  glUseProgram((*program)->program.name());
+  glUniform1i((*program)->locations[0], static_cast<GLint>(slot.layer));
+  glBindVertexArray(no_array_.name());
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, pool.texture(slot));
   for (int level = 1; level < pool.format().levels; ++level) {
-    const int from = pool.format().side >> (level - 1);
-    const int to = pool.format().side >> level;
-    glFramebufferTextureLayer(GL_READ_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, texture, level - 1, layer);
-    glFramebufferTextureLayer(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, texture, level, layer);
-    glBlitFramebuffer(0, 0, from, from, 0, 0, to, to, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+    // Only the larger level can be read, so that drawing into the smaller one is no feedback.
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_BASE_LEVEL, level - 1);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, level - 1);
+    glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, pool.texture(slot), level,
+                              static_cast<GLint>(slot.layer));
+    glViewport(0, 0, pool.format().side >> level, pool.format().side >> level);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
   }
+  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_BASE_LEVEL, 0);
+  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, pool.format().levels - 1);
+  glBindVertexArray(0);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  return {};
 }
 
 }  // namespace tellurion::render

@@ -33,17 +33,18 @@ class Compositor {
     std::size_t bytes() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4; }
   };
 
-  Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs);
+  Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs, gpu::ProgramFamily reduce_programs);
   Scratch& scratch_for(gpu::RenderThread& thread, const raster::Image& image, Budget& budget);
   void upload_cells(const surface::ImagePatch& patch);
   Result<void> draw(gpu::RenderThread& thread, const surface::ImagePatch& patch, Budget& budget);
-  void make_levels(const SlotPool& pool, Slot slot);
+  Result<void> make_levels(gpu::RenderThread& thread, const SlotPool& pool, Slot slot);
 
   gpu::ProgramFamily programs_;
+  gpu::ProgramFamily reduce_programs_;
   gpu::VertexArray array_;
+  gpu::VertexArray no_array_;  // for draws that need no vertices
   gpu::Buffer cells_;
   gpu::Framebuffer target_;
-  gpu::Framebuffer source_;
   std::vector<Scratch> scratch_;
   std::vector<float> cell_points_;
   std::uint64_t use_ = 0;

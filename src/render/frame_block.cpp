@@ -32,7 +32,7 @@ glm::dmat4 projection(const view::Camera& camera, bool reversed) {
 
 /// Pictures from space are exposed for the bright disc, those from the ground for the sky: share of the air's brightness.
 double exposure(double height_m) {
-  const double t = std::clamp((height_m - 20e3) / 300e3, 0.0, 1.0);
+  const double t = std::clamp((height_m - 2e3) / 80e3, 0.0, 1.0);
   return 1.0 - 0.5 * t * t * (3.0 - 2.0 * t);
 }
 
@@ -69,7 +69,6 @@ FrameBlock make_frame_block(const view::Camera& camera, const FrameLook& look, c
   block.clip_from_relative = glm::mat4(projection(camera, reversed) * glm::dmat4(glm::transpose(camera.axes)));
   block.sun = glm::vec4(look.to_sun.xyz, look.exaggeration);
   block.clear_colour = glm::vec4(look.clear, 1.0f);
-  block.viewport = glm::vec4(camera.width, camera.height, 0.0, 0.0);
   if (options.air) add_air(block, camera, look, options.ellipsoid, *options.air);
   return block;
 }

@@ -21,7 +21,6 @@ struct FrameBlock {
   glm::vec4 sky_north;
   glm::vec4 sky_up;
   glm::vec4 clear_colour;
-  glm::vec4 viewport;
 };
 
 /// Everything nearer than this is cut away. Floating-point depth loses nothing by its being small.

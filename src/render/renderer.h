@@ -28,7 +28,7 @@ struct Air {
   glm::dvec3 scattering_per_m{5.8e-6, 13.5e-6, 33.1e-6};  ///< by molecules at height 0: red, green, blue
   double haze_per_m = 2.0e-6;                             ///< grey scattering, mostly forwards
   double top_m = 100e3;                                   ///< nothing is drawn above
-  double brightness = 18.0;                               ///< of the scattered light, 1 leaving a pixel at 1 - 1/e
+  double brightness = 15.0;                               ///< of the scattered light, 1 leaving a pixel at 1 - 1/e
 };
 
 struct RendererOptions {

@@ -13,7 +13,6 @@ namespace {
 using surface::DrawTile;
 
 constexpr int kTileVectors = 8;  // u_tile of shaders/surface.vert
-constexpr float kLineBias = 1e-5f;
 
 /// Scale and offset from the tile coordinates of `tile` to texture coordinates of the slot of `owner`.
 glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int side, int gutter, float layer) {
@@ -126,7 +125,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     u.v[4] = slot_place(tile.key, tile.colour_owner, surface::kColourSlotSide, surface::kColourGutter, colour.layer);
     u.v[5] = slot_place(tile.key, tile.slope_owner, surface::kSlopeSlotSide, surface::kSlopeGutter, slopes.layer);
     u.v[6] = u.v[4];
-    u.v[7] = glm::vec4(tile.fade, kLineBias, 0, 0);
+    u.v[7] = glm::vec4(tile.fade, 0, 0, 0);
     bind(0, colour.texture);
     bind(1, slopes.texture);
     if (fades) {
