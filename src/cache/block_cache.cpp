@@ -98,11 +98,6 @@ Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const D
 }
 
 void BlockCache::State::keep(const Name& name, const Block& block, std::size_t block_bytes) {
-  while (!entries.empty() && bytes > budget_bytes) {
-    bytes -= entries.back().bytes;
-    index.erase(entries.back().name);
-    entries.pop_back();
-  }
   entries.push_front(Entry{name, block, block_bytes});
   index.emplace(name, entries.begin());
   bytes += block_bytes;
