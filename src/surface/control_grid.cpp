@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -15,18 +16,19 @@ namespace tellurion::surface {
 namespace {
 
 constexpr double kTileTexels = kColourSlotSide - 2 * kColourGutter;
-constexpr int kLeastCells = 4;
-constexpr int kDeepest = 6;  ///< squares of 4 texels, cells of one
+constexpr int kLeastCellTexels = 4;
+constexpr int kDeepest = 3;  ///< squares of 32 texels
 
 /// Share of a nominal texel that interpolated places may be off: a third of the smallest texel of a level (0.7 nominal).
 constexpr double kTolerance = 0.23;
 
-int cells_at(int level, int depth) { return std::max(kLeastCells, (level == 0 ? 32 : 16) >> depth); }
+int square_texels(int depth) { return kColourSlotSide >> depth; }
 
 bool is_finite(const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); }
 
-double slot_coordinate(int i, int depth) {
-  return (std::ldexp(static_cast<double>(kColourSlotSide) * i, -depth) - kColourGutter) / kTileTexels;
+/// Tile coordinate at `i` squares from the slot's border.
+double slot_coordinate(double i, int depth) {
+  return (std::ldexp(kColourSlotSide * i, -depth) - kColourGutter) / kTileTexels;
 }
 
 class Mapper {
@@ -57,60 +59,75 @@ class Mapper {
   };
 
   void map_square(const SlotSquare& square) {
-    const Points points = sample(square);
-    // The cells that hold some of the raster.
-    int first_column = points.cells, last_column = -1, first_row = points.cells, last_row = -1;
-    int touching = 0;
+    int cells = std::max(2, (key_.level == 0 ? 32 : 16) >> square.depth);
+    for (;;) {
+      const Points points = sample(square, cells);
+      std::optional<ControlGrid> grid = touching_part(square, points);
+      if (!grid) return;
+      const bool projectable = std::all_of(grid->pixels.begin(), grid->pixels.end(), is_finite);
+      const double worst = projectable ? worst_error(points) / tolerance_ : INFINITY;
+      if (worst <= 1.0) return keep(square, points, std::move(*grid));
+      // Halving cells takes away three quarters of the error, except round a singularity: that is to be cut out.
+      const int finer = cells * (worst <= 4.0 ? 2 : 4);
+      if (worst <= 16.0 && square_texels(square.depth) / finer >= kLeastCellTexels) {
+        cells = finer;
+      } else if (square.depth < kDeepest) {
+        for (int i = 0; i < 4; ++i) map_square({square.depth + 1, 2 * square.column + (i & 1), 2 * square.row + (i >> 1)});
+        return;
+      } else {
+        grid->follows = false;
+        return keep(square, points, std::move(*grid));
+      }
+    }
+  }
+
+  /// The cells that hold some of the raster.
+  std::optional<ControlGrid> touching_part(const SlotSquare& square, const Points& points) const {
+    glm::ivec2 first(points.cells), last(-1);
     for (int row = 0; row < points.cells; ++row) {
       for (int column = 0; column < points.cells; ++column) {
         if (!touches_raster(points, column, row)) continue;
-        first_column = std::min(first_column, column);
-        last_column = std::max(last_column, column);
-        first_row = std::min(first_row, row);
-        last_row = std::max(last_row, row);
-        ++touching;
+        first = glm::min(first, glm::ivec2(column, row));
+        last = glm::max(last, glm::ivec2(column, row));
       }
     }
-    if (touching == 0) return;
+    if (last.x < 0) return std::nullopt;
+    const auto along = [&](int column, int row) {
+      return glm::dvec2(slot_coordinate(square.column + static_cast<double>(column) / points.cells, square.depth),
+                        slot_coordinate(square.row + static_cast<double>(row) / points.cells, square.depth));
+    };
     ControlGrid grid;
-    grid.columns = last_column + 1 - first_column;
-    grid.rows = last_row + 1 - first_row;
-    for (int row = first_row; row <= last_row + 1; ++row) {
-      for (int column = first_column; column <= last_column + 1; ++column) {
+    grid.lower = along(first.x, first.y);
+    grid.upper = along(last.x + 1, last.y + 1);
+    grid.columns = last.x + 1 - first.x;
+    grid.rows = last.y + 1 - first.y;
+    grid.cell_texels = square_texels(square.depth) / points.cells;
+    for (int row = first.y; row <= last.y + 1; ++row) {
+      for (int column = first.x; column <= last.x + 1; ++column) {
         grid.pixels.push_back(points.pixels[points.at(2 * column, 2 * row)]);
       }
     }
-    const bool projectable = std::all_of(grid.pixels.begin(), grid.pixels.end(), is_finite);
-    if (square.depth < kDeepest && (!projectable || !follows_projection(points))) {
-      for (int i = 0; i < 4; ++i) map_square({square.depth + 1, 2 * square.column + (i & 1), 2 * square.row + (i >> 1)});
-      return;
-    }
-    if (!projectable) return;
+    grid.pixels_per_texel = median_step(grid) / static_cast<double>(grid.cell_texels);
+    return grid;
+  }
 
-    const glm::dvec2 lower(slot_coordinate(square.column, square.depth), slot_coordinate(square.row, square.depth));
-    const glm::dvec2 upper(slot_coordinate(square.column + 1, square.depth), slot_coordinate(square.row + 1, square.depth));
-    const auto along = [&](int column, int row) {
-      return glm::mix(lower, upper, glm::dvec2(column, row) / static_cast<double>(points.cells));
-    };
-    grid.lower = along(first_column, first_row);
-    grid.upper = along(last_column + 1, last_row + 1);
-    const double cell_texels = std::ldexp(static_cast<double>(kColourSlotSide), -square.depth) / points.cells;
-    grid.pixels_per_texel = median_step(grid) / cell_texels;
+  void keep(const SlotSquare& square, const Points& points, ControlGrid grid) {
     covered_ += std::ldexp(static_cast<double>(grid.columns * grid.rows) / (points.cells * points.cells), -2 * square.depth);
     out_.whole = covered_ == 1.0;  // sums of powers of two: exact
     out_.grids.push_back(std::move(grid));
   }
 
-  Points sample(const SlotSquare& square) {
+  Points sample(const SlotSquare& square, int cells) {
     Points points;
-    points.cells = cells_at(key_.level, square.depth);
+    points.cells = cells;
     points.side = 2 * points.cells + 1;
-    const glm::dvec2 lower(slot_coordinate(square.column, square.depth), slot_coordinate(square.row, square.depth));
-    const glm::dvec2 upper(slot_coordinate(square.column + 1, square.depth), slot_coordinate(square.row + 1, square.depth));
+    const auto along = [&](int i, int start) {
+      return slot_coordinate(start + static_cast<double>(i) / (points.side - 1), square.depth);
+    };
+    points.normals.reserve(static_cast<std::size_t>(points.side) * static_cast<std::size_t>(points.side));
     for (int y = 0; y < points.side; ++y) {
       for (int x = 0; x < points.side; ++x) {
-        const glm::dvec2 share = glm::dvec2(x, y) / static_cast<double>(points.side - 1);
-        points.normals.push_back(geo::tile_normal(key_, glm::mix(lower, upper, share)));
+        points.normals.push_back(geo::tile_normal(key_, {along(x, square.column), along(y, square.row)}));
       }
     }
     places_.resize(points.normals.size());
@@ -154,8 +171,8 @@ class Mapper {
     return in_x && high.y > 0.0 && low.y < size_.y;
   }
 
-  /// Whether bilinear interpolation between the cells' corners leads to the right places.
-  bool follows_projection(const Points& points) {
+  /// How far bilinear interpolation between the cells' corners leads from the right places, radians; infinite if to none.
+  double worst_error(const Points& points) {
     checked_pixels_.clear();
     checked_normals_.clear();
     for (int y = 0; y < points.side; ++y) {
@@ -173,11 +190,12 @@ class Mapper {
     }
     places_.resize(checked_pixels_.size());
     reader_.to_places(checked_pixels_, places_);
+    double worst = 0.0;
     for (std::size_t i = 0; i < places_.size(); ++i) {
       const double off = glm::distance(geo::normal_at(places_[i]).xyz, checked_normals_[i].xyz);
-      if (!(off <= tolerance_)) return false;  // NaN fails too
+      if (!(off <= worst)) worst = std::isfinite(off) ? off : INFINITY;
     }
-    return true;
+    return worst;
   }
 
   /// Source columns and rows along a step of a cell, in the direction in which each grows fastest.
@@ -187,10 +205,12 @@ class Mapper {
     for (int y = 0; y < grid.rows; ++y) {
       for (int x = 0; x < grid.columns; ++x) {
         const glm::dvec2 here = at(x, y), ds = at(x + 1, y) - here, dt = at(x, y + 1) - here;
+        if (!is_finite(ds) || !is_finite(dt)) continue;
         columns.push_back(std::hypot(ds.x, dt.x));
         rows.push_back(std::hypot(ds.y, dt.y));
       }
     }
+    if (columns.empty()) return glm::dvec2(1.0);
     const auto median = [](std::vector<double>& values) {
       const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
       std::nth_element(values.begin(), middle, values.end());

@@ -21,12 +21,15 @@ struct SlotSquare {
 
 /// Part of a square, as (columns + 1) x (rows + 1) control points, row by row.
 struct ControlGrid {
+  bool follows = true;             ///< places interpolated between the points are right to a third of a texel; where not (round
+                                   ///< a pole of the source, on the rim of its projection) it has to be sampled place by place
+  int cell_texels = 0;             ///< of the slot, along a cell's side
   glm::dvec2 lower{0.0};           ///< tile coordinates of the first point
   glm::dvec2 upper{0.0};           ///< and the last
   int columns = 0;
   int rows = 0;
   std::vector<glm::dvec2> pixels;  ///< of the source's level 0, continuous across its wrap (x may lie outside the raster)
-  glm::dvec2 pixels_per_texel{0};  ///< of source columns and rows along their steepest direction, median of the cells
+  glm::dvec2 pixels_per_texel{0};  ///< source columns and rows along their steepest direction, median of the cells
 };
 
 /// The source under a slot: grids that together hold all of the raster in the slot, and `whole` if they fill it.

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -47,12 +49,13 @@ int power_of_two_within(double ratio) {
   return factor;
 }
 
-/// The coarsest level that keeps a pixel a texel on the axis that has fewest; the other axis is reduced by whole factors.
-/// Nothing if the grid lies beside the raster after all.
-std::optional<WindowChoice> choose_window(const source::RasterDescription& raster, const ControlGrid& grid) {
+/// The coarsest level that keeps a pixel a texel on the axis that has fewest, the other axis to be reduced by whole factors;
+/// the window holds all `pixels` (of level 0). Nothing if they lie beside the raster after all.
+std::optional<WindowChoice> choose_window(const source::RasterDescription& raster, std::span<const glm::dvec2> pixels,
+                                          glm::dvec2 pixels_per_texel) {
   constexpr double kLargestRead = 4096.0 * 4096.0;  // pixels, before reduction
   glm::dvec2 low(INFINITY), high(-INFINITY);
-  for (const glm::dvec2& pixel : grid.pixels) {
+  for (const glm::dvec2& pixel : pixels) {
     low = glm::min(low, pixel);
     high = glm::max(high, pixel);
   }
@@ -63,13 +66,13 @@ std::optional<WindowChoice> choose_window(const source::RasterDescription& raste
   low.y = std::max(low.y, -2.0);
   high.y = std::min(high.y, raster.levels.front().height + 2.0);
 
-  if (low.x >= high.x || low.y >= high.y) return std::nullopt;
+  if (!(low.x <= high.x && low.y <= high.y)) return std::nullopt;
 
   const int last = static_cast<int>(raster.levels.size()) - 1;
   WindowChoice choice;
   for (;; ++choice.level) {
     const glm::dvec2 scale = source::level_scale(raster, choice.level);
-    const glm::dvec2 per_texel = grid.pixels_per_texel * scale;
+    const glm::dvec2 per_texel = pixels_per_texel * scale;
     const glm::dvec2 size = (high - low) * scale + 4.0;
     if (choice.level < last && (std::min(per_texel.x, per_texel.y) >= 2.0 || size.x * size.y > kLargestRead)) continue;
     choice.reduction = {power_of_two_within(std::max(per_texel.x, size.x / (kLargestWindow / 2))),
@@ -77,8 +80,8 @@ std::optional<WindowChoice> choose_window(const source::RasterDescription& raste
     // One pixel, after reduction, round all that is sampled.
     const glm::ivec2 first = glm::ivec2(glm::floor(low * scale - 0.5)) - choice.reduction + 1;
     const glm::ivec2 end = glm::ivec2(glm::ceil(high * scale + 0.5)) + choice.reduction - 1;
-    const glm::ivec2 pixels = (end - first + choice.reduction - 1) / choice.reduction * choice.reduction;
-    choice.window = {first.x, first.y, pixels.x, pixels.y};
+    const glm::ivec2 whole = (end - first + choice.reduction - 1) / choice.reduction * choice.reduction;
+    choice.window = {first.x, first.y, whole.x, whole.y};
     return choice;
   }
 }
@@ -128,28 +131,113 @@ bool is_opaque(const raster::Image& image) {
   return true;
 }
 
-/// A patch without an image if there is nothing to show.
-Result<ImagePatch> make_patch(cache::CachedRaster& raster, const ControlGrid& grid, const ClosedSides& closed) {
-  const source::RasterDescription& about = raster.description();
-  ImagePatch patch;
-  const std::optional<WindowChoice> found = choose_window(about, grid);
-  if (!found) return patch;
-  const WindowChoice& choice = *found;
-  Result<raster::Image> image = raster.read_colours(choice.level, choice.window);
-  if (!image) return image.error();
-  clear_outside(*image, choice.window, about.levels[static_cast<std::size_t>(choice.level)], about.wraps, closed);
+/// Pixels of a window after reduction, with the way into them.
+struct Window {
+  raster::Image image;
+  glm::dvec2 first{0.0};  ///< of level 0
+  glm::dvec2 scale{0.0};  ///< pixels of `image` per pixel of level 0
+};
 
-  patch.image = reduced(*image, choice.reduction);
-  patch.opaque = is_opaque(patch.image);
+/// Empty if there is nothing to show.
+Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dvec2> pixels, glm::dvec2 pixels_per_texel,
+                           const ClosedSides& closed) {
+  const source::RasterDescription& about = raster.description();
+  Window window;
+  const std::optional<WindowChoice> choice = choose_window(about, pixels, pixels_per_texel);
+  if (!choice) return window;
+  Result<raster::Image> image = raster.read_colours(choice->level, choice->window);
+  if (!image) return image.error();
+  clear_outside(*image, choice->window, about.levels[static_cast<std::size_t>(choice->level)], about.wraps, closed);
+  window.image = reduced(*image, choice->reduction);
+  const glm::dvec2 scale = source::level_scale(about, choice->level);
+  window.first = glm::dvec2(choice->window.x, choice->window.y) / scale;
+  window.scale = scale / glm::dvec2(choice->reduction);
+  return window;
+}
+
+/// Where the source's projection is smooth: the window itself, drawn through the control points.
+Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& grid, const ClosedSides& closed) {
+  Result<Window> window = read_window(raster, grid.pixels, grid.pixels_per_texel, closed);
+  if (!window) return window.error();
+  ImagePatch patch;
   patch.columns = grid.columns;
   patch.rows = grid.rows;
-  patch.lower = glm::vec2(grid.lower);
-  patch.upper = glm::vec2(grid.upper);
-  const glm::dvec2 scale = source::level_scale(about, choice.level);
-  const glm::dvec2 first(choice.window.x, choice.window.y);
-  const glm::dvec2 size(choice.window.width, choice.window.height);
+  const glm::dvec2 size(window->image.width, window->image.height);
   patch.image_points.reserve(grid.pixels.size());
-  for (const glm::dvec2& pixel : grid.pixels) patch.image_points.emplace_back((pixel * scale - first) / size);
+  for (const glm::dvec2& pixel : grid.pixels) {
+    patch.image_points.emplace_back((pixel - window->first) * window->scale / size);
+  }
+  patch.image = std::move(window->image);
+  return patch;
+}
+
+/// Bilinear colour, 0 to 255 a channel; `at` is continuous, as pixel coordinates are.
+std::array<float, 4> sample(const raster::Image& image, glm::dvec2 at) {
+  const glm::dvec2 corner = glm::floor(at - 0.5);
+  const glm::vec2 share(at - 0.5 - corner);
+  std::array<float, 4> sum{};
+  for (int i = 0; i < 4; ++i) {
+    const int x = std::clamp(static_cast<int>(corner.x) + (i & 1), 0, image.width - 1);
+    const int y = std::clamp(static_cast<int>(corner.y) + (i >> 1), 0, image.height - 1);
+    const float weight = ((i & 1) != 0 ? share.x : 1.0f - share.x) * ((i >> 1) != 0 ? share.y : 1.0f - share.y);
+    const std::array<std::uint8_t, 4> colour = image.at(x, y);
+    for (std::size_t c = 0; c < 4; ++c) sum[c] += weight * static_cast<float>(colour[c]);
+  }
+  return sum;
+}
+
+/// Where it is not: the texels themselves, each the mean of kPerTexel^2 places.
+Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
+                               const ClosedSides& closed) {
+  constexpr int kPerTexel = 2;
+  const glm::ivec2 texels = glm::ivec2(grid.columns, grid.rows) * grid.cell_texels;
+  const glm::ivec2 samples = texels * kPerTexel;
+  std::vector<geo::LatLon> places;
+  places.reserve(static_cast<std::size_t>(samples.x) * static_cast<std::size_t>(samples.y));
+  for (int y = 0; y < samples.y; ++y) {
+    for (int x = 0; x < samples.x; ++x) {
+      const glm::dvec2 share = (glm::dvec2(x, y) + 0.5) / glm::dvec2(samples);
+      places.push_back(geo::place_of_normal(geo::tile_normal(key, glm::mix(grid.lower, grid.upper, share))));
+    }
+  }
+  std::vector<glm::dvec2> pixels(places.size());
+  raster.reader().to_pixels(places, pixels);
+  const Result<Window> window = read_window(raster, pixels, grid.pixels_per_texel, closed);
+  if (!window) return window.error();
+
+  ImagePatch patch;
+  if (window->image.rgba.empty()) return patch;
+  patch.columns = patch.rows = 1;
+  patch.image_points = {{0.0f, 0.0f}, {1.0f, 0.0f}, {0.0f, 1.0f}, {1.0f, 1.0f}};
+  patch.image = {texels.x, texels.y, {}};
+  patch.image.rgba.reserve(static_cast<std::size_t>(texels.x) * static_cast<std::size_t>(texels.y) * 4);
+  for (int row = 0; row < texels.y; ++row) {
+    for (int column = 0; column < texels.x; ++column) {
+      std::array<float, 4> sum{};
+      for (int i = 0; i < kPerTexel * kPerTexel; ++i) {
+        const int x = column * kPerTexel + i % kPerTexel, y = row * kPerTexel + i / kPerTexel;
+        const glm::dvec2 at = (pixels[static_cast<std::size_t>(y * samples.x + x)] - window->first) * window->scale;
+        if (!std::isfinite(at.x) || !std::isfinite(at.y)) continue;
+        if (at.x < 0.0 || at.y < 0.0 || at.x > window->image.width || at.y > window->image.height) continue;
+        const std::array<float, 4> colour = sample(window->image, at);
+        for (std::size_t c = 0; c < 4; ++c) sum[c] += colour[c];
+      }
+      for (const float channel : sum) {
+        patch.image.rgba.push_back(static_cast<std::uint8_t>(std::lround(channel / (kPerTexel * kPerTexel))));
+      }
+    }
+  }
+  return patch;
+}
+
+/// A patch without an image if there is nothing to show.
+Result<ImagePatch> make_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
+                              const ClosedSides& closed) {
+  Result<ImagePatch> patch = grid.follows ? window_patch(raster, grid, closed) : texel_patch(raster, key, grid, closed);
+  if (!patch) return patch.error();
+  patch->opaque = is_opaque(patch->image);
+  patch->lower = glm::vec2(grid.lower);
+  patch->upper = glm::vec2(grid.upper);
   return patch;
 }
 
@@ -178,9 +266,12 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
     bool hides_all_below = mapping.whole;
     for (const ControlGrid& grid : mapping.grids) {
       if (stop.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key)};
-      Result<ImagePatch> patch = make_patch(layer->raster, grid, closed);
+      Result<ImagePatch> patch = make_patch(layer->raster, key, grid, closed);
       if (!patch) return patch.error();
-      if (patch->image.rgba.empty()) continue;
+      if (patch->image.rgba.empty()) {
+        hides_all_below = false;
+        continue;
+      }
       patch->opacity = settings.opacity;
       patch->gamma = settings.gamma;
       patch->multiplier = settings.multiplier;

@@ -35,8 +35,8 @@ class ColourModel {
 };
 
 /// The patches of all layers that touch the tile, lowest first; layers wholly hidden by opaque ones above are left out.
-/// Between control points places err by less than a third of a texel, except within a texel or two of a pole of the source.
-/// Windows have about one to two pixels a texel on either axis, at most kLargestWindow on a side.
+/// Between control points places err by less than a third of a texel; round a pole of the source, where none could do that, the
+/// slot's own texels are sampled here. Windows have about one to two pixels a texel on either axis, at most kLargestWindow on a side.
 /// Errors: those of reading, cancelled.
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop = {});
 
