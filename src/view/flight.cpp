@@ -61,8 +61,8 @@ Result<Flight> Flight::create(std::vector<FlightSample> samples) {
     if (i > 0) {
       const Knot& previous = flight.knots_.back();
       const std::string number = std::to_string(i + 1);
-      if (!(samples[i].time_s > samples[i - 1].time_s))
-        return fail("sample " + number + " is not later than the one before");
+      if (!(samples[i].time_s - samples[i - 1].time_s >= kShortestStep_s))
+        return fail("sample " + number + " is not at least 1e-6 s later than the one before");
       if (glm::dot(knot.normal, previous.normal) < kLargestStep) {
         return fail("sample " + number + " lies on the other side of the planet: add samples on the way");
       }

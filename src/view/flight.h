@@ -16,6 +16,9 @@
 
 namespace tellurion::view {
 
+/// Times of samples lie at least so far apart: what the text form resolves.
+inline constexpr double kShortestStep_s = 1e-6;
+
 struct FlightSample {
   double time_s = 0;
   Pose pose;
@@ -25,7 +28,8 @@ struct FlightSample {
 /// Between two samples the height stays between theirs; where the camera rests, it rests.
 class Flight {
  public:
-  /// Errors: invalid_argument (no samples, times not growing, or neighbours nearly on opposite sides of the planet).
+  /// Errors: invalid_argument (no samples, times not growing by 1e-6 s, or neighbours nearly on opposite sides of the
+  /// planet).
   static Result<Flight> create(std::vector<FlightSample> samples);
 
   std::span<const FlightSample> samples() const { return samples_; }

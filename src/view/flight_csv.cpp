@@ -76,8 +76,8 @@ Result<Flight> parse_flight(std::string_view text, std::string_view name) {
     const Result<std::array<double, 7>> numbers = parse_line(line);
     if (!numbers) return fail(line_number, numbers.error().message);
     samples.push_back(sample_of(*numbers));
-    if (samples.size() > 1 && !(samples.back().time_s > samples[samples.size() - 2].time_s)) {
-      return fail(line_number, "column time: not later than the line before");
+    if (samples.size() > 1 && !(samples.back().time_s - samples[samples.size() - 2].time_s >= kShortestStep_s)) {
+      return fail(line_number, "column time: not at least 1e-6 s later than the line before");
     }
   }
   if (samples.empty()) return fail(2, "no samples after the header");

@@ -149,7 +149,8 @@ TEST_CASE("parse_flight: names file, line and column of every fault") {
   CHECK(error_of(header + "0,46,7,3000,0,-10,0,\n") == "f.csv:2: more than 7 columns");
   CHECK(error_of(header + "\n0,95,7,3000,0,-10,0\n") == "f.csv:3: column lat: 95 is beyond 90");
   CHECK(error_of(header + "0,46,7,nan,0,-10,0\n") == "f.csv:2: column height: 'nan' is no number");
-  CHECK(error_of(header + "1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n") == "f.csv:3: column time: not later than the line before");
+  CHECK(error_of(header + "1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n") ==
+        "f.csv:3: column time: not at least 1e-6 s later than the line before");
   CHECK(error_of(header + "0,0,0,0,0,0,0\n1,0,180,0,0,0,0\n").starts_with("f.csv: flight: sample 2"));
 }
 
