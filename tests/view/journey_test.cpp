@@ -23,7 +23,8 @@ TEST_CASE("Journey: begins and ends where it should, without a jump on the way")
        {std::pair{"46,7,3000,10,-20", "46.01,7.02,2000,200,-60"}, std::pair{"46,7,3000,10,-20", "-33,151,500,0,-90"},
         std::pair{"0,0,1000", "0,180,1000"}, std::pair{"90,0,1000", "-90,0,1e7"}, std::pair{"10,179,500", "10,-179,0"},
         std::pair{"46,7,3000,10,-20", "46,7,30,10,-20"}, std::pair{"46,7,3000,10,-20", "46,7,3000,100,-20"}}) {
-    CAPTURE(std::string(from) + " to " + to);
+    const std::string way = std::string(from) + " to " + to;
+    CAPTURE(way);
     const Journey journey(kWgs84, pose(from), pose(to));
     CHECK(glm::distance(eye_of(journey.pose_at(0.0)), eye_of(pose(from))) == 0.0);
     CHECK(glm::distance(eye_of(journey.pose_at(1.0)), eye_of(pose(to))) == 0.0);
