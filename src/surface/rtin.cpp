@@ -32,7 +32,7 @@ GridPoint middle(GridPoint p, GridPoint q) { return {(p.x + q.x) / 2, (p.y + q.y
 template <class Visit>
 void for_each_hypotenuse(int side, Visit&& visit) {
   const int last = side - 1;
-  for (int half = 1; half < side; half *= 2) {
+  for (int half = 1; half < last; half *= 2) {
     const int whole = 2 * half;
     for (int y = 0; y <= last; y += half) {
       const bool odd_row = ((y / half) & 1) != 0;
@@ -166,16 +166,22 @@ std::vector<float> midpoint_errors(std::span<const float> heights, int side) {
   std::vector<float> errors(heights.size(), 0.0f);
   for_each_hypotenuse(side, [&](GridPoint m, GridPoint a, GridPoint b, int step, bool diagonal) {
     const std::size_t i = index_of(m.x, m.y, side);
-    const float mean = (heights[index_of(a.x, a.y, side)] + heights[index_of(b.x, b.y, side)]) / 2.0f;
-    errors[i] = std::max(std::abs(mean - heights[i]), largest_below(errors, side, m, step, diagonal));
+    const double mean =
+        (static_cast<double>(heights[index_of(a.x, a.y, side)]) + static_cast<double>(heights[index_of(b.x, b.y, side)])) / 2.0;
+    const auto own = static_cast<float>(std::abs(mean - static_cast<double>(heights[i])));
+    errors[i] = std::max(own, largest_below(errors, side, m, step, diagonal));
   });
   return errors;
 }
 
-std::vector<float> true_errors(std::span<const double> heights, int side) {
+std::vector<float> true_errors(std::span<const double> heights, int side, double enough) {
   assert(is_rtin_side(side) && heights.size() == static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   std::vector<float> errors(heights.size(), 0.0f);
   for_each_hypotenuse(side, [&](GridPoint m, GridPoint a, GridPoint b, int step, bool diagonal) {
+    const float below = largest_below(errors, side, m, step, diagonal);
+    float& error = errors[index_of(m.x, m.y, side)];
+    error = below;
+    if (static_cast<double>(below) > enough) return;
     // The right angles of the triangles on both sides of the hypotenuse: (b - a) / 2 turned by a right angle.
     const int rx = -(b.y - a.y) / 2, ry = (b.x - a.x) / 2;
     double largest = 0.0;
@@ -184,10 +190,8 @@ std::vector<float> true_errors(std::span<const double> heights, int side) {
       if (c.x < 0 || c.x >= side || c.y < 0 || c.y >= side) continue;
       largest = std::max(largest, deviation_of({a, b, c}, heights, side));
     }
-    // Rounded up, so that a float comparison with the tolerance stays on the safe side.
-    const float own = std::nextafter(static_cast<float>(largest), INFINITY);
-    errors[index_of(m.x, m.y, side)] =
-        std::max(largest == 0.0 ? 0.0f : own, largest_below(errors, side, m, step, diagonal));
+    // Rounded up, so that a comparison with the tolerance stays on the safe side.
+    if (largest > 0.0) error = std::max(below, std::nextafter(static_cast<float>(largest), HUGE_VALF));
   });
   return errors;
 }
