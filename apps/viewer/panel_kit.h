@@ -1,0 +1,20 @@
+// Small parts that several panels are made of.
+#pragma once
+
+#include <string>
+
+#include "globe/api.h"
+
+namespace tellurion::apps {
+
+/// `bytes` for people: "12.3 MB".
+std::string text_of_bytes(double bytes);
+/// A length in metres for people: "850 m", "12.4 km".
+std::string text_of_metres(double metres);
+/// "46.5000 N  8.0000 E".
+std::string text_of_place(const geo::LatLon& place);
+
+/// A row of a table of two columns: a name and, right-aligned, a value.
+void table_row(const char* name, const std::string& value);
+
+}  // namespace tellurion::apps

@@ -1,0 +1,48 @@
+// The panels over the picture (Dear ImGui): toolbar, status line, statistics, layers, settings, help, hints.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "globe/api.h"
+#include "viewer/bindings.h"
+#include "viewer/viewer_state.h"
+
+namespace tellurion::apps {
+
+class Window;
+
+class Panels {
+ public:
+  /// Sets up Dear ImGui for `window`, which outlives this.
+  explicit Panels(const Window& window);
+  ~Panels();
+  Panels(const Panels&) = delete;
+  Panels& operator=(const Panels&) = delete;
+
+  /// Begins a frame: from here on the panels know whether the mouse is theirs.
+  void begin();
+  bool take_mouse() const;
+  bool take_keyboard() const;
+
+  /// Lays out the panels, draws them over the picture and changes `state` as the user asks.
+  /// Gives the command of a button that was pressed.
+  std::optional<Command> draw(const globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
+                              ViewerState& state);
+
+ private:
+  void toolbar(ViewerState& state, std::optional<Command>& command);
+  void statistics(const globe::FrameStats& stats, bool& shown);
+  void layers(const globe::Globe& globe, bool& shown);
+  void settings(ViewerState& state);
+  void help(bool& shown);
+  void hints(const globe::Globe& globe, bool& shown);
+  void activity(const Moment& moment);
+  void status_line(const globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment);
+
+  static constexpr std::size_t kGraphFrames = 120;
+  std::array<float, kGraphFrames> frame_ms_{};  ///< a ring
+  std::size_t next_frame_ = 0;
+};
+
+}  // namespace tellurion::apps

@@ -1,0 +1,133 @@
+// The panels that only show: statistics and layers.
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "viewer/panel_kit.h"
+#include "viewer/panels.h"
+
+namespace tellurion::apps {
+namespace {
+
+constexpr float kStatisticsWidth = 290.0f;
+constexpr float kLayersWidth = 420.0f;
+
+/// "3:12 4:25": what there is of each level.
+std::string by_level(const std::vector<int>& counts) {
+  std::string text;
+  for (std::size_t level = 0; level < counts.size(); ++level) {
+    if (counts[level] > 0) text += fmt::format("{}{}:{}", text.empty() ? "" : "  ", level, counts[level]);
+  }
+  return text.empty() ? "none" : text;
+}
+
+void raster_rows(const source::RasterDescription& raster) {
+  const auto& full = raster.levels.front();
+  table_row("size", fmt::format("{} x {}, {} levels", full.width, full.height, raster.levels.size()));
+  table_row("samples",
+            fmt::format("{}, {} {}", raster.sample_type, raster.band_count, raster.band_count == 1 ? "band" : "bands"));
+  table_row("spacing", text_of_metres(raster.spacing.value));
+  table_row("projection", raster.crs_name);
+  if (raster.kind == source::SampleKind::height)
+    table_row("vertical datum", raster.vertical_declared ? raster.vertical : raster.vertical + " (assumed)");
+}
+
+void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats* stats) {
+  const bool failed = !layer.error.empty() || (stats && stats->errors > 0);
+  if (failed) ImGui::PushStyleColor(ImGuiCol_Text, {1.0f, 0.55f, 0.45f, 1.0f});
+  const std::string title =
+      fmt::format("{} ({}){}", layer.spec.name, globe::name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
+  const bool open = ImGui::CollapsingHeader(title.c_str(), ImGuiTreeNodeFlags_DefaultOpen);
+  if (failed) ImGui::PopStyleColor();
+  if (!open) return;
+  ImGui::PushTextWrapPos(0.0f);
+  ImGui::TextDisabled("%s", layer.spec.source.path.string().c_str());
+  if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingStretchProp)) {
+    if (layer.raster) raster_rows(layer.raster->description());
+    if (stats)
+      table_row("read",
+                fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(stats->bytes)), stats->requests));
+    if (stats && stats->errors > 0) table_row("errors", std::to_string(stats->errors));
+    ImGui::EndTable();
+  }
+  if (!layer.error.empty())
+    ImGui::TextWrapped("%s", layer.error.c_str());
+  else if (stats && !stats->last_error.empty())
+    ImGui::TextWrapped("%s", stats->last_error.c_str());
+  if (layer.raster) {
+    for (const std::string& hint : layer.raster->description().hints)
+      ImGui::TextColored({1.0f, 0.80f, 0.40f, 1.0f}, "%s", hint.c_str());
+  }
+  ImGui::PopTextWrapPos();
+}
+
+}  // namespace
+
+void Panels::statistics(const globe::FrameStats& s, bool& shown) {
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({display.x - 10.0f, 52.0f}, ImGuiCond_FirstUseEver, {1.0f, 0.0f});
+  ImGui::SetNextWindowSize({kStatisticsWidth, 0.0f}, ImGuiCond_Always);
+  if (ImGui::Begin("Statistics", &shown, ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoResize)) {
+    const float slowest = *std::max_element(frame_ms_.begin(), frame_ms_.end());
+    ImGui::Text("%.1f ms", s.frame_ms);
+    ImGui::SameLine();
+    ImGui::TextDisabled("at most %.0f ms in %zu frames", static_cast<double>(slowest), kGraphFrames);
+    ImGui::PlotLines("##frames", frame_ms_.data(), static_cast<int>(frame_ms_.size()), static_cast<int>(next_frame_),
+                     nullptr, 0.0f, std::max(40.0f, 1.2f * slowest), {ImGui::GetContentRegionAvail().x, 64.0f});
+    if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingStretchProp)) {
+      const auto count = [](auto n) { return fmt::format("{}", n); };
+      const auto bytes = [](std::int64_t n) { return text_of_bytes(static_cast<double>(n)); };
+      table_row("frame", count(s.frame));
+      table_row("select, upload, draw", fmt::format("{:.2f}, {:.1f}, {:.1f} ms", s.select_ms, s.upload_ms, s.draw_ms));
+      table_row("frames over 33 ms", count(s.frames_over_budget));
+      table_row("tiles visited", count(s.tiles_visited));
+      table_row("tiles selected", count(s.tiles_selected));
+      table_row("tiles drawn", count(s.tiles_drawn));
+      table_row("tiles waiting", count(s.tiles_waiting));
+      table_row("triangles", count(s.triangles));
+      table_row("draws", count(s.draws));
+      table_row("largest error", fmt::format("{:.2f} px", s.max_error_px));
+      table_row("requests", count(s.requests));
+      table_row("cancelled", count(s.requests_cancelled));
+      table_row("fetched", bytes(s.bytes_fetched));
+      table_row("uploaded", bytes(s.bytes_uploaded));
+      table_row("memory cache", bytes(s.memory_cache_bytes));
+      table_row("GPU cache", bytes(s.gpu_cache_bytes));
+      table_row("disk cache", bytes(s.disk_cache_bytes));
+      table_row("resident", bytes(globe::resident_bytes()));
+      table_row("picture", s.complete ? "complete" : "loading");
+      ImGui::EndTable();
+    }
+    ImGui::Separator();
+    ImGui::TextDisabled("drawn, level:tiles");
+    ImGui::TextWrapped("%s", by_level(s.tiles_drawn_by_level).c_str());
+  }
+  ImGui::End();
+}
+
+void Panels::layers(const globe::Globe& globe, bool& shown) {
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({10.0f, 52.0f}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowSize({kLayersWidth, std::min(520.0f, display.y - 110.0f)}, ImGuiCond_FirstUseEver);
+  if (ImGui::Begin("Layers", &shown, ImGuiWindowFlags_NoCollapse)) {
+    const auto stats = globe.source_stats();
+    const auto stats_of = [&stats](const std::string& name) -> const globe::SourceStats* {
+      const auto found = std::find_if(stats.begin(), stats.end(), [&](const auto& s) { return s.name == name; });
+      return found == stats.end() ? nullptr : &*found;
+    };
+    ImGui::TextUnformatted(globe.world().planet.c_str());
+    if (!globe.world().file.empty()) ImGui::TextDisabled("%s", globe.world().file.string().c_str());
+    int number = 0;
+    for (const globe::LayerInfo& layer : globe.layers()) {
+      ImGui::PushID(number++);
+      layer_entry(layer, stats_of(layer.spec.name));
+      ImGui::PopID();
+    }
+  }
+  ImGui::End();
+}
+
+}  // namespace tellurion::apps
