@@ -77,7 +77,7 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
     const geo::GeodeticBounds reach = reach_of(layer.source->description());
-    model.layers_.push_back({&layer, std::move(raster).value(), reach});
+    model.layers_.push_back({&layer, std::move(raster).value(), reach, {}});
   }
   model.description_ = std::move(description);
   return model;
@@ -138,8 +138,7 @@ Result<void> ElevationModel::sample_layer(HeightLayer& layer, double wanted_spac
       void_.push_back(static_cast<std::uint32_t>(i));
     }
   }
-  const int coarsest = std::min(kCoarsestFill, static_cast<int>(raster.levels.size()) - 1);
-  for (int coarse = level + 1; coarse <= coarsest && !void_.empty(); ++coarse) {
+  for (int coarse = level + 1; coarse <= kCoarsestFill && !void_.empty(); ++coarse) {
     const double spacing = spacing_of_level(raster, coarse);
     std::erase_if(void_, [&](std::uint32_t i) {
       return spacing > below_[i] || samples_[i].coverage >= bring_within(raster, level, pixels_[i]).reach;
@@ -147,7 +146,7 @@ Result<void> ElevationModel::sample_layer(HeightLayer& layer, double wanted_spac
     void_pixels_.clear();
     for (const std::uint32_t i : void_) void_pixels_.push_back(bring_within(raster, level, pixels_[i]).pixel);
     void_samples_.resize(void_.size());
-    if (Result<void> read = layer.raster.sample_heights(coarse, void_pixels_, void_samples_); !read) return read;
+    if (Result<void> read = sample_voids(layer, coarse); !read) return read;
     for (std::size_t n = 0; n < void_.size(); ++n) {
       const std::uint32_t i = void_[n];
       const double missing = bring_within(raster, level, pixels_[i]).reach - samples_[i].coverage;
@@ -159,6 +158,25 @@ Result<void> ElevationModel::sample_layer(HeightLayer& layer, double wanted_spac
       samples_[i].coverage = coverage;
     }
   }
+  return {};
+}
+
+/// Samples of a level at void_pixels_, whether the raster has that level or not.
+Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
+  const int last = static_cast<int>(layer.raster.description().levels.size()) - 1;
+  if (level <= last) return layer.raster.sample_heights(level, void_pixels_, void_samples_);
+  while (static_cast<int>(layer.beyond.size()) < level - last) {
+    if (layer.beyond.empty()) {
+      const Result<CoarseHeights> known = last_level(layer.raster);
+      if (!known) return known.error();
+      layer.beyond.push_back(next_level(*known));
+    } else {
+      layer.beyond.push_back(next_level(layer.beyond.back()));
+    }
+  }
+  const CoarseHeights& heights = layer.beyond[static_cast<std::size_t>(level - last - 1)];
+  std::transform(void_pixels_.begin(), void_pixels_.end(), void_samples_.begin(),
+                 [&](const glm::dvec2& pixel) { return heights.sample(pixel); });
   return {};
 }
 

@@ -13,6 +13,7 @@
 #include "geo/ellipsoid.h"
 #include "geo/tile_key.h"
 #include "source/raster_source.h"
+#include "surface/coarse_heights.h"
 #include "surface/tile_content.h"
 
 namespace tellurion::surface {
@@ -51,7 +52,7 @@ struct ElevationAnswer {
 /// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
 /// continuous across voids and borders; 0 where there is nothing. A void inside a layer shows the finest data that there are:
 /// the layer's own coarser levels, made of the samples round the void, as long as they are finer than the layers below (not
-/// beyond level kCoarsestFill); then those layers. So a hole of some samples in a mountain is no pit down to a coarse globe.
+/// beyond level kCoarsestFill); then those layers. So a hole in a mountain's samples is no pit down to a coarse globe.
 class ElevationModel {
  public:
   static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
@@ -78,7 +79,8 @@ class ElevationModel {
   struct HeightLayer {
     const Layer* settings;
     cache::CachedRaster raster;
-    geo::GeodeticBounds reach;  ///< outside of it the layer's coverage is 0
+    geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
+    std::vector<CoarseHeights> beyond; ///< levels after the raster's last, made when a void asks for them
   };
 
   ElevationModel() = default;
@@ -89,6 +91,7 @@ class ElevationModel {
   Result<void> compose(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres,
                        std::span<double> spacings);
   Result<void> sample_layer(HeightLayer& layer, double wanted_spacing);
+  Result<void> sample_voids(HeightLayer& layer, int level);
 
   // Kept between calls: one allocation serves all batches.
   std::vector<geo::LatLon> places_;

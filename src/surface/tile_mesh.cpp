@@ -44,7 +44,7 @@ double slope_of(const std::array<glm::dvec3, 3>& base, const std::array<double, 
 /// A chord's sag depends on its length alone, and at every level of the network chords are of nearly one length: that of
 /// the largest tile is taken for all, so that a border is split alike from both sides.
 void add_curvature(std::span<float> errors, double tile_size, double radius, double tolerance) {
-  for (int half = 1; half < kGridSide; half *= 2) {
+  for (int half = 1; 2 * half < kGridSide; half *= 2) {
     const double leg = tile_size * 2.0 * half / (kGridSide - 1);
     const auto axial = static_cast<float>(sag(leg * leg, radius) / tolerance);
     const auto diagonal = static_cast<float>(sag(2.0 * leg * leg, radius) / tolerance);
@@ -108,7 +108,7 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
 
   // No normal section of an oblate ellipsoid is curved more than the meridian at the equator.
   const double tightest_radius = ellipsoid.b() * ellipsoid.b() / ellipsoid.a();
-  std::vector<float> errors = true_errors(heights, kGridSide);
+  std::vector<float> errors = true_errors(heights, kGridSide, tolerance.height);
   for (float& error : errors) error = static_cast<float>(error / tolerance.height);
   add_curvature(errors, nominal_tile_size(ellipsoid, key.level), tightest_radius, tolerance.curvature);
   saturate_errors(errors, kGridSide);
