@@ -5,11 +5,12 @@ set -euo pipefail
 
 usage() {
   cat <<'USAGE'
-usage: tools/setup.sh [--test] [--fuzz] [--dry-run]
+usage: tools/setup.sh [--test] [--fuzz] [--bench] [--dry-run]
 
 Installs what is missing of the Debian 12 packages to build and run Tellurion.
   --test      also what the tests need (doctest, GeographicLib, Python, Xvfb, ...)
   --fuzz      also what the fuzzers need (clang with libFuzzer)
+  --bench     also what a benchmark compares with: Node.js and the npm package @mapbox/martini
   --dry-run   only name the missing packages
 USAGE
 }
@@ -32,10 +33,12 @@ fuzz_packages=(clang libclang-rt-14-dev)
 
 packages=("${build_packages[@]}")
 dry_run=false
+bench=false
 while (($#)); do
   case $1 in
     --test) packages+=("${test_packages[@]}") ;;
     --fuzz) packages+=("${fuzz_packages[@]}") ;;
+    --bench) bench=true; command -v npm >/dev/null || packages+=(nodejs npm) ;;
     --dry-run) dry_run=true ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
@@ -54,7 +57,16 @@ missing=()
 for package in "${packages[@]}"; do
   grep -qxF -- "$package" <<<"$installed" || missing+=("$package")
 done
-((${#missing[@]})) || exit 0
+
+# npm packages, once the Debian packages are there.
+martini=$(dirname "${BASH_SOURCE[0]}")/../bench/martini
+install_npm_packages() {
+  if $bench && ! [[ -d $martini/node_modules/@mapbox/martini ]]; then
+    npm ci --prefix "$martini" --no-audit --no-fund >&2
+  fi
+}
+
+((${#missing[@]})) || { $dry_run || install_npm_packages; exit 0; }
 
 if $dry_run; then
   printf '%s\n' "${missing[@]}"
@@ -74,3 +86,4 @@ echo "tools/setup.sh: installing ${missing[*]}" >&2
 # Output goes to standard error: the caller's standard output stays its own.
 "${as_root[@]}" apt-get update -q >&2
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >&2
+install_npm_packages

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds every #include of src/ and apps/ against cmake/rooms.txt.
+"""Holds every #include of src/, bench/ and apps/ against cmake/rooms.txt.
 
 usage: check_includes.py ROOT     checks the tree below ROOT; exit status 1 with one line per violation
        check_includes.py --self-test   plants each kind of violation in a small tree and requires that it is found
@@ -16,8 +16,9 @@ import tempfile
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"([^"]+)"|<([^>]+)>)', re.MULTILINE)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SOURCE_SUFFIXES = {".h", ".cpp"}
-# Where a header may be used from, so as not to be an orphan.
-USERS = ("src", "apps", "tests", "fuzz", "bench", "examples", "web")
+CHECKED = ("src", "bench", "apps")
+# Where else a header may be used from, so as not to be an orphan.
+USERS = ("tests", "fuzz", "examples", "web")
 
 
 class Rules:
@@ -54,6 +55,8 @@ def resolve(root, path, name):
         return pathlib.Path("src") / name, True
     if path.parts[0] == "apps" and (root / "apps" / name).is_file():
         return pathlib.Path("apps") / name, True
+    if name.startswith("bench/") and path.parts[0] in ("apps", "bench") and (root / name).is_file():
+        return pathlib.Path(name), True
     beside = root / path.parent / name
     if beside.is_file():
         return pathlib.Path(beside.resolve().relative_to(root.resolve())), False
@@ -89,7 +92,7 @@ def cycles(graph):
 def check(root):
     rules = Rules((root / "cmake/rooms.txt").read_text(encoding="utf-8"))
     violations, graph, included = [], {}, set()
-    files = sources(root, "src") + sources(root, "apps")
+    files = [path for folder in CHECKED for path in sources(root, folder)]
     for path in files:
         room = rules.room_of(path)
         if room not in rules.rooms:
@@ -102,7 +105,8 @@ def check(root):
                 included.add(target)
                 graph.setdefault(path, []).append(target)
                 if not well_named or not quoted:
-                    violations.append(f'{where}: write this include as "{target.relative_to(target.parts[0])}"')
+                    right = target if target.parts[0] == "bench" else target.relative_to(target.parts[0])
+                    violations.append(f'{where}: write this include as "{right}"')
                 used = rules.room_of(target)
                 if used not in rules.rooms[room]:
                     violations.append(f"{where}: `{room}` may not use `{used}` ({name})")
@@ -115,7 +119,7 @@ def check(root):
     for cycle in cycles(graph):
         violations.append("cycle: " + " -> ".join(map(str, cycle)))
 
-    for folder in USERS[2:]:
+    for folder in USERS:
         for path in sources(root, folder):
             for _, name, _ in includes_of(root / path):
                 target, _ = resolve(root, path, name)
@@ -137,6 +141,8 @@ def self_test():
         "src/gpu/texture.cpp": "#include <epoxy/gl.h>\n",
         "src/source/gdal/open.cpp": "#include <gdal_priv.h>\n#include <cpl_vsi.h>\n",
         "src/globe/globe.h": '#pragma once\n#include "geo/ellipsoid.h"\n',
+        "bench/registry.h": '#pragma once\n#include "geo/ellipsoid.h"\n',
+        "bench/frame.cpp": '#include "bench/registry.h"\n#include "globe/globe.h"\n',
         "apps/viewer/window.h": '#pragma once\n#include "globe/globe.h"\n',
         "apps/viewer/window.cpp": '#include "viewer/window.h"\n#include <GLFW/glfw3.h>\n#include <imgui.h>\n',
     }
@@ -144,6 +150,9 @@ def self_test():
         ("a room below uses one above", {"src/geo/bad.cpp": '#include "globe/globe.h"\n'}, "`geo` may not use `globe`"),
         ("rooms side by side", {"src/raster/bad.cpp": '#include "geo/ellipsoid.h"\n'}, "`raster` may not use `geo`"),
         ("apps look behind globe", {"apps/bad.cpp": '#include "geo/ellipsoid.h"\n'}, "`apps` may not use `geo`"),
+        ("a room uses the benchmarks", {"src/globe/bad.cpp": '#include "bench/registry.h"\n'}, "there is no file src/bench"),
+        ("a benchmark names a neighbour", {"bench/bad.cpp": '#include "registry.h"\n'}, 'write this include as "bench/registry.h"'),
+        ("OpenGL in a benchmark", {"bench/bad.cpp": "#include <epoxy/gl.h>\n"}, "may name epoxy/gl.h"),
         ("OpenGL outside", {"src/surface/bad.cpp": "#include <epoxy/gl.h>\n"}, "may name epoxy/gl.h"),
         ("OpenGL in the viewer", {"apps/viewer/bad.cpp": "#include <GL/gl.h>\n"}, "may name GL/gl.h"),
         ("OpenGL ES outside", {"src/globe/bad.cpp": "#include <GLES3/gl3.h>\n"}, "may name GLES3/gl3.h"),
