@@ -127,6 +127,10 @@ TEST_CASE("open_gdal: a geotransform without area is refused") {
 }
 
 TEST_CASE("open_gdal: the network is never touched, not even through a VRT") {
+  configure_gdal(64 << 20);
+  GDALAllRegister();
+  CHECK(GetGDALDriverManager()->GetDriverByName("WMS") == nullptr);
+  CHECK(GetGDALDriverManager()->GetDriverByName("GTiff") != nullptr);
   for (const char* path : {"/vsicurl/http://127.0.0.1:9/a.tif", "http://127.0.0.1:9/a.tif", "/vsis3/bucket/a.tif"}) {
     check_error({.path = path}, ErrorCode::unsupported, "network access is off");
   }

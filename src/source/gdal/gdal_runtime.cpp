@@ -49,9 +49,12 @@ void prepare_gdal() {
   std::call_once(once, [] {
     const QuietErrors quiet;
     GDALAllRegister();
+    std::string skipped = CPLGetConfigOption("GDAL_SKIP", "");
     for (const char* name : kNetworkDrivers) {
-      if (GDALDriver* driver = GetGDALDriverManager()->GetDriverByName(name)) GetGDALDriverManager()->DeregisterDriver(driver);
+      if (GetGDALDriverManager()->GetDriverByName(name) != nullptr) skipped += std::string(" ") + name;
     }
+    CPLSetConfigOption("GDAL_SKIP", skipped.c_str());
+    GDALAllRegister();  // takes them out, and whoever calls it again does not bring them back
     for (const char* prefix : kNetworkFileSystems) {  // GDAL owns the handlers
       for (const char* end : {"/", "?"}) VSIFileManager::InstallHandler(std::string(prefix) + end, std::make_unique<RefusedFileSystem>().release());
     }
