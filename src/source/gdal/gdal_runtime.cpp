@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <cpl_conv.h>
 #include <cpl_vsi_virtual.h>
@@ -25,9 +29,11 @@ constexpr std::array kNetworkSchemes{"http://", "https://", "ftp://", "WMS:", "W
 
 constexpr const char* kNoNetwork = "GDAL's network access is off; download the file, or give the URL of tiles as a source of type \"xyz\"";
 
-/// Stands for a network file system and refuses to open anything.
+/// Stands in for a network file system, which it owns, and refuses to open anything.
 class RefusedFileSystem final : public VSIFilesystemHandler {
  public:
+  explicit RefusedFileSystem(std::unique_ptr<VSIFilesystemHandler> refused) : refused_(std::move(refused)) {}
+
   VSIVirtualHandle* Open(const char* name, const char*, bool, CSLConstList) override {
     CPLError(CE_Failure, CPLE_OpenFailed, "%s: %s", name, kNoNetwork);
     return nullptr;
@@ -36,7 +42,25 @@ class RefusedFileSystem final : public VSIFilesystemHandler {
     CPLError(CE_Failure, CPLE_OpenFailed, "%s: %s", name, kNoNetwork);
     return -1;
   }
+
+ private:
+  std::unique_ptr<VSIFilesystemHandler> refused_;
 };
+
+void refuse_network_file_systems() {
+  std::map<VSIFilesystemHandler*, std::vector<std::string>> prefixes_of;  // one may serve several
+  for (const char* name : kNetworkFileSystems) {
+    for (const char* end : {"/", "?"}) {
+      VSIFilesystemHandler* handler = VSIFileManager::GetHandler((std::string(name) + end).c_str());
+      prefixes_of[handler].push_back(std::string(name) + end);
+    }
+  }
+  prefixes_of.erase(VSIFileManager::GetHandler("."));  // plain files: GDAL was built without those
+  for (const auto& [handler, prefixes] : prefixes_of) {
+    VSIFilesystemHandler* refused = std::make_unique<RefusedFileSystem>(std::unique_ptr<VSIFilesystemHandler>(handler)).release();  // GDAL owns it
+    for (const std::string& prefix : prefixes) VSIFileManager::InstallHandler(prefix, refused);
+  }
+}
 
 bool begins_with_any(std::string_view text, auto&& prefixes) {
   return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return text.starts_with(prefix); });
@@ -55,9 +79,7 @@ void prepare_gdal() {
     }
     CPLSetConfigOption("GDAL_SKIP", skipped.c_str());
     GDALAllRegister();  // takes them out, and whoever calls it again does not bring them back
-    for (const char* prefix : kNetworkFileSystems) {  // GDAL owns the handlers
-      for (const char* end : {"/", "?"}) VSIFileManager::InstallHandler(std::string(prefix) + end, std::make_unique<RefusedFileSystem>().release());
-    }
+    refuse_network_file_systems();
     OSRSetPROJEnableNetwork(FALSE);
   });
 }
