@@ -15,6 +15,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "surface/height_field.h"
 #include "surface/rtin.h"
 #include "surface/tile_grid.h"
 
@@ -25,9 +26,10 @@ constexpr int kJobLevel = 2;
 constexpr int kJobsPerFace = 1 << (2 * kJobLevel);
 constexpr int kRun = 16;  ///< samples of a row that are left out together
 
-/// Samples are compared at their own places and half-way between; the true largest deviation lies a little above. The largest
-/// excess found over etopo5, SRTM and LOLA data, with a hundred random places a sample, was 0.03.
-constexpr double kBetweenSamples = 1.05;
+/// The surface between samples is compared where those round it are off by this share of the worst so far, up to a quarter of
+/// a sample apart; between such places the deviation can be a little larger.
+constexpr double kWorthALook = 0.4;
+constexpr double kBetweenPlaces = 1.05;
 
 constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), 0.0f};
 
@@ -50,20 +52,30 @@ struct OnPath {
   double steps_per_unit = 0.0;  ///< of the grid, per unit of face coordinates
   std::vector<double> heights;
   TileRecord record = kNothingYet;
-
-  void compare(glm::dvec2 uv, double metres) {
-    const glm::dvec2 grid = (uv - rect.lower) * steps_per_unit;
-    const double shown = interpolate_in_triangles(heights, kGridSide, grid.x, grid.y);
-    worst = std::max(worst, std::abs(metres - shown));
-  }
   double worst = 0.0;  ///< largest distance so far between the data and the grid
+
+  /// The distance at a place. `slack`: how far the surface may be from `metres` round there.
+  double compare(glm::dvec2 uv, double metres, double slack = 0.0) {
+    const glm::dvec2 grid = (uv - rect.lower) * steps_per_unit;
+    const double off = std::abs(metres - interpolate_in_triangles(heights, kGridSide, grid.x, grid.y)) + slack;
+    worst = std::max(worst, off);
+    return off;
+  }
+
+  /// How far a point lies beside the tile; NaN for one that is not there.
+  double outside(glm::dvec2 uv) const {
+    const glm::dvec2 below = rect.lower - uv, beyond = uv - rect.upper;
+    return std::isfinite(uv.x) ? std::max(std::max(below.x, below.y), std::max(beyond.x, beyond.y)) : NAN;
+  }
 };
 
 /// A sample of a raster, seen from the face.
 struct FaceSample {
   glm::dvec2 uv{NAN};
   double metres = 0.0;
-  bool within = false;  ///< the leaf
+  bool within = false;    ///< the leaf
+  double off_leaf = 0.0;  ///< its distance from the leaf's grid and from that of the leaf's parent
+  double off_parent = 0.0;
 };
 
 class Scanner {
@@ -115,7 +127,7 @@ class Scanner {
 
   static TileRecord finished(const OnPath& tile) {
     TileRecord record = tile.record;
-    const double error = kBetweenSamples * tile.worst;
+    const double error = kBetweenPlaces * tile.worst;
     if (error > 0.0) record.error = std::max(record.error, std::nextafter(static_cast<float>(error), INFINITY));
     return record;
   }
@@ -124,14 +136,68 @@ class Scanner {
     OnPath& leaf = path_.back();
     const auto [lowest, highest] = std::minmax_element(leaf.heights.begin(), leaf.heights.end());
     extend_range(*lowest, *highest);
-    for (std::size_t i = 0; i < model_.layer_count(); ++i) {
-      if (!model_.layer(i).source->coverage().touches(leaf.key)) continue;
-      if (Result<void> scanned = scan_raster(model_.raster(i)); !scanned) return scanned;
-    }
+    const double finest = finest_spacing(model_.description().heights, leaf.key);
+    const bool finer_than_data = nominal_grid_spacing(model_.description().ellipsoid, leaf.key.level) <= 0.75 * finest;
+    const Result<void> scanned = finer_than_data ? compare_fine_grid() : compare_samples();
+    if (!scanned) return scanned;
     for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
       path_[i].record.min_height = std::min(path_[i].record.min_height, leaf.record.min_height);
       path_[i].record.max_height = std::max(path_[i].record.max_height, leaf.record.max_height);
     }
+    return {};
+  }
+
+  /// A leaf beside finer data: its own grid stands for the surface. Coarser grids differ most from it at its points, for they
+  /// are linear on each of its triangles.
+  Result<void> compare_fine_grid() {
+    const geo::TileKey key = path_.back().key;
+    const Result<HeightField> field = field_of_finest_data(model_, key);
+    if (!field) return field.error();
+    for (std::size_t i = 0; i < field->heights.size(); ++i) {
+      const glm::dvec2 share = glm::dvec2(i % kGridSide, i / kGridSide) / static_cast<double>(kGridSide - 1);
+      const glm::dvec2 uv = glm::mix(path_.back().rect.lower, path_.back().rect.upper, share);
+      for (OnPath& tile : path_) tile.compare(uv, field->heights[i], field->error);
+    }
+    const auto [lowest, highest] = std::minmax_element(field->heights.begin(), field->heights.end());
+    extend_range(*lowest - field->error, *highest + field->error);
+    return {};
+  }
+
+  /// Every raster's own samples; and half-way between the grid's points: along the borders, which lie between samples, and
+  /// where some raster ends everywhere.
+  Result<void> compare_samples() {
+    const geo::TileKey& key = path_.back().key;
+    const double finest = finest_spacing(model_.description().heights, key);
+    bool some_raster_ends = false;
+    for (std::size_t i = 0; i < model_.layer_count(); ++i) {
+      const source::RasterSource& source = *model_.layer(i).source;
+      if (!source.coverage().touches(key)) continue;
+      const bool is_finest = source.coverage().spacing_under(key).value <= finest;
+      if (Result<void> scanned = scan_raster(model_.raster(i), is_finest); !scanned) return scanned;
+      some_raster_ends = some_raster_ends || !source.description().wraps;
+    }
+    return compare_half_steps(some_raster_ends);
+  }
+
+  Result<void> compare_half_steps(bool inside_too) {
+    constexpr int kLast = 2 * (kGridSide - 1);
+    const OnPath& leaf = path_.back();
+    std::vector<glm::dvec2> uv;
+    std::vector<geo::Vector<geo::Ecef>> normals;
+    for (int y = 0; y <= kLast; ++y) {
+      const bool whole_row = inside_too || y == 0 || y == kLast;
+      for (int x = 0; x <= kLast; x += whole_row ? 1 : kLast) {
+        uv.push_back(leaf.rect.lower + (leaf.rect.upper - leaf.rect.lower) * (glm::dvec2(x, y) / static_cast<double>(kLast)));
+        normals.push_back(geo::face_normal(leaf.key.face, uv.back()));
+      }
+    }
+    metres_.resize(normals.size());
+    if (Result<void> read = model_.heights(normals, 0.0, metres_); !read) return read;
+    for (std::size_t i = 0; i < uv.size(); ++i) {
+      for (OnPath& tile : path_) tile.compare(uv[i], metres_[i]);
+    }
+    const auto [lowest, highest] = std::minmax_element(metres_.begin(), metres_.end());
+    extend_range(*lowest, *highest);
     return {};
   }
 
@@ -141,46 +207,67 @@ class Scanner {
     record.max_height = std::max(record.max_height, static_cast<float>(std::ceil(high)));
   }
 
-  /// Compares all samples of a raster within the leaf with the whole path, and the places half-way to the samples on the left,
-  /// above, and across with the leaf, whose grid is about as fine as they are.
-  Result<void> scan_raster(cache::CachedRaster& raster) {
+  /// Compares all samples of a raster within the leaf with the whole path; and the surface between them, if nothing finer
+  /// shapes it.
+  Result<void> scan_raster(cache::CachedRaster& raster, bool is_finest) {
     const std::optional<source::PixelWindow> window = window_under_leaf(raster);
     if (!window) return {};
-    const OnPath& leaf = path_.back();
-    // Samples just outside shape the surface within: two of them, in face coordinates.
+    // Samples just outside shape the surface within: three of them, in face coordinates.
     const double quarter = model_.description().ellipsoid.b() * std::numbers::pi / 4.0;
-    const double spacing = raster.description().spacing.value;
-    const double ring = 3.0 * spacing / quarter;
+    const double ring = 3.0 * raster.description().spacing.value / quarter;
     const auto width = static_cast<std::size_t>(window->width);
     above_.assign(width, {});
     for (int row = 0; row < window->height; ++row) {
-      if (Result<void> read = read_row(raster, window->x, window->y + row, window->width, leaf, ring); !read) return read;
+      if (Result<void> read = read_row(raster, window->x, window->y + row, window->width, ring); !read) return read;
       for (std::size_t x = 0; x < width; ++x) {
-        const FaceSample& here = row_[x];
-        if (here.within) {
-          for (OnPath& tile : path_) tile.compare(here.uv, here.metres);
-        }
-        if (x > 0) compare_between(here, row_[x - 1]);
-        compare_between(here, above_[x]);
-        if (x > 0) compare_middle({here, row_[x - 1], above_[x], above_[x - 1]});
+        FaceSample& here = row_[x];
+        if (here.within) compare_sample(here);
+        if (is_finest && x > 0) compare_cell(above_[x - 1], above_[x], row_[x - 1], here);
       }
       std::swap(row_, above_);
     }
     return {};
   }
 
-  void compare_between(const FaceSample& a, const FaceSample& b) {
-    if (a.within && b.within) path_.back().compare((a.uv + b.uv) / 2.0, (a.metres + b.metres) / 2.0);
-  }
-  void compare_middle(const std::array<FaceSample, 4>& s) {
-    if (s[0].within && s[1].within && s[2].within && s[3].within) {
-      path_.back().compare((s[0].uv + s[1].uv + s[2].uv + s[3].uv) / 4.0,
-                     (s[0].metres + s[1].metres + s[2].metres + s[3].metres) / 4.0);
+  void compare_sample(FaceSample& sample) {
+    for (OnPath& tile : path_) {
+      sample.off_parent = sample.off_leaf;
+      sample.off_leaf = tile.compare(sample.uv, sample.metres);
     }
   }
 
+  /// The bilinear surface between four samples, a row above another, against the two finest grids, whose steps are about as
+  /// small as the samples'.
+  void compare_cell(const FaceSample& a, const FaceSample& b, const FaceSample& c, const FaceSample& d) {
+    if (!std::isfinite(a.uv.x + b.uv.x + c.uv.x + d.uv.x)) return;
+    const bool all_within = a.within && b.within && c.within && d.within;
+    const auto look = [&](OnPath& tile, int step) {  // in quarters of the cell
+      double off = 0.0;
+      for (int i = 0; i < 4; i += step) {
+        for (int j = 0; j < 4; j += step) {
+          if (i == 0 && j == 0) continue;  // the sample itself
+          const double x = j / 4.0, y = i / 4.0;
+          const double la = (1 - x) * (1 - y), lb = x * (1 - y), lc = (1 - x) * y, ld = x * y;
+          const glm::dvec2 uv = la * a.uv + lb * b.uv + lc * c.uv + ld * d.uv;
+          if (!all_within && path_.back().outside(uv) > 0.0) continue;
+          off = std::max(off, tile.compare(uv, la * a.metres + lb * b.metres + lc * c.metres + ld * d.metres));
+        }
+      }
+      return off;
+    };
+    OnPath& leaf = path_.back();
+    double off = std::max(std::max(a.off_leaf, b.off_leaf), std::max(c.off_leaf, d.off_leaf));
+    if (!all_within || off >= kWorthALook * leaf.worst) off = std::max(off, look(leaf, 2));
+    if (off >= kWorthALook * leaf.worst) look(leaf, 1);
+    if (path_.size() < 2) return;
+    OnPath& parent = path_[path_.size() - 2];
+    const double off_parent = std::max(std::max(a.off_parent, b.off_parent), std::max(c.off_parent, d.off_parent));
+    if (!all_within || off_parent >= kWorthALook * parent.worst) look(parent, 2);
+  }
+
   /// One row of the raster's samples: where they lie on the face, and the surface's height where that is on the leaf.
-  Result<void> read_row(cache::CachedRaster& raster, int first, int y, int width, const OnPath& leaf, double ring) {
+  Result<void> read_row(cache::CachedRaster& raster, int first, int y, int width, double ring) {
+    const OnPath& leaf = path_.back();
     const int columns = raster.description().levels.front().width;
     const auto pixel = [&](int i) { return glm::dvec2((first + i) % columns + 0.5, y + 0.5); };
     row_.assign(static_cast<std::size_t>(width), {});
@@ -189,24 +276,24 @@ class Scanner {
     pixels_.clear();
     for (int i = 0; i < width; i += kRun) pixels_.push_back(pixel(i));
     pixels_.push_back(pixel(width - 1));
-    project(raster, leaf);
+    project(raster);
     ends_ = projected_;
     pixels_.clear();
     wanted_.clear();
     for (int i = 0; i < width; i += kRun) {
       const auto run = static_cast<std::size_t>(i / kRun);
       const double far = glm::distance(ends_[run], ends_[run + 1]) + ring;
-      if (outside(leaf, ends_[run]) > far && outside(leaf, ends_[run + 1]) > far) continue;
+      if (leaf.outside(ends_[run]) > far && leaf.outside(ends_[run + 1]) > far) continue;
       for (int j = i; j < std::min(i + kRun, width); ++j) {
         wanted_.push_back(static_cast<std::size_t>(j));
         pixels_.push_back(pixel(j));
       }
     }
-    project(raster, leaf);
+    project(raster);
 
     std::size_t count = 0;
     for (std::size_t n = 0; n < wanted_.size(); ++n) {
-      const double distance = outside(leaf, projected_[n]);
+      const double distance = leaf.outside(projected_[n]);
       if (!(distance <= ring)) continue;
       FaceSample& sample = row_[wanted_[n]];
       sample.uv = projected_[n];
@@ -224,21 +311,15 @@ class Scanner {
   }
 
   /// places_ and face coordinates of pixels_; NaN where there are none.
-  void project(cache::CachedRaster& raster, const OnPath& leaf) {
+  void project(cache::CachedRaster& raster) {
     places_.resize(pixels_.size());
     projected_.assign(pixels_.size(), glm::dvec2(NAN));
     raster.reader().to_places(pixels_, places_);
     for (std::size_t i = 0; i < places_.size(); ++i) {
       if (!std::isfinite(places_[i].latitude.value) || !std::isfinite(places_[i].longitude.value)) continue;
-      const std::optional<glm::dvec2> uv = geo::project_to_face(leaf.key.face, geo::normal_at(places_[i]));
+      const std::optional<glm::dvec2> uv = geo::project_to_face(path_.back().key.face, geo::normal_at(places_[i]));
       if (uv) projected_[i] = *uv;
     }
-  }
-
-  /// How far a point lies beside a tile; NaN for one that is not there.
-  static double outside(const OnPath& tile, glm::dvec2 uv) {
-    const glm::dvec2 below = tile.rect.lower - uv, beyond = uv - tile.rect.upper;
-    return std::isfinite(uv.x) ? std::max(std::max(below.x, below.y), std::max(beyond.x, beyond.y)) : NAN;
   }
 
   /// Columns and rows that hold all samples within the leaf and round it; x may run past the raster's width where it wraps.

@@ -1,14 +1,13 @@
 #include "surface/tile_builder.h"
 
 #include <algorithm>
-#include <cassert>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "surface/height_field.h"
 #include "surface/rtin.h"
 #include "surface/slope_map.h"
 #include "surface/tile_grid.h"
@@ -18,23 +17,12 @@ namespace tellurion::surface {
 namespace {
 
 constexpr int kCells = kGridSide - 1;
-constexpr int kFineSide = 2 * kGridSide + 1;  ///< half steps over the tile, and one more beyond each border
 
 /// The height samples that a tile's grid is made of are as far apart as the grid itself while its error is known from the
 /// finest data; below that they are the finest there are.
 double wanted_spacing(const SurfaceFacts& facts, const geo::Ellipsoid& ellipsoid, const geo::TileKey& key) {
   return facts.facts_of(key).height_error ? nominal_grid_spacing(ellipsoid, key.level) : 0.0;
 }
-
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  void add(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  double width() const { return high - low; }
-};
 
 /// What the parent level's full grid shows at the grid points of its child `key`.
 Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key) {
@@ -54,41 +42,6 @@ Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceF
   return heights;
 }
 
-/// A tile's grid and how well it shows the surface.
-struct HeightField {
-  std::vector<geo::Vector<geo::Ecef>> normals;
-  std::vector<double> heights;
-  double error = 0.0;
-};
-
-Result<HeightField> known_field(ElevationModel& model, const geo::TileKey& key, double error) {
-  HeightField field;
-  field.normals = grid_normals(key, kGridSide);
-  field.heights.resize(field.normals.size());
-  field.error = error;
-  const double spacing = nominal_grid_spacing(model.description().ellipsoid, key.level);
-  if (Result<void> read = model.heights(field.normals, spacing, field.heights); !read) return read.error();
-  return field;
-}
-
-Result<HeightField> measured_field(ElevationModel& model, const geo::TileKey& key) {
-  constexpr double kStep = 0.5 / kCells;
-  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kFineSide, -kStep, 1.0 + kStep);
-  std::vector<double> heights(normals.size());
-  if (Result<void> read = model.heights(normals, 0.0, heights); !read) return read.error();
-  HeightField field;
-  field.error = error_between_samples(heights);
-  // The grid's own places again, not those of the finer one: neighbours share them to the bit.
-  field.normals = grid_normals(key, kGridSide);
-  field.heights.reserve(field.normals.size());
-  for (int row = 0; row < kGridSide; ++row) {
-    for (int column = 0; column < kGridSide; ++column) {
-      field.heights.push_back(heights[static_cast<std::size_t>((2 * row + 1) * kFineSide + 2 * column + 1)]);
-    }
-  }
-  return field;
-}
-
 /// The error of the nearest ancestor for which it is known: nothing below can be worse.
 double error_of_ancestors(const SurfaceFacts& facts, geo::TileKey key) {
   while (key.level > 0) {
@@ -100,38 +53,11 @@ double error_of_ancestors(const SurfaceFacts& facts, geo::TileKey key) {
 
 }  // namespace
 
-// Let f be the surface, g = f - (its interpolation over a triangle T of the grid), in units of the grid's step, so that T's
-// corners are v0 = (0, 0), v1 = (1, 0), v2 = (0, 1) after a rotation. g vanishes at the corners. Let f be piecewise smooth and
-// continuous, with df/dx and df/dy over T within ranges of widths wx and wy; those of g have the same widths. Let m be the
-// middle of its ranges. For p = (x, y) = sum l_i v_i in T (l_i >= 0, sum l_i = 1) and every i,
-//   g(p) = integral of grad g from v_i to p = m . (p - v_i) + r_i,  |r_i| <= wx/2 |x - x_i| + wy/2 |y - y_i|.
-// Weighted by l_i and summed, the terms in m cancel: |g(p)| <= sum l_i |r_i| = wx x (1 - x) + wy y (1 - y) <= (wx + wy) / 4.
-// It is attained by a crease along the triangle's middle. The ranges are taken from differences over half steps up to one half step
-// beyond the cell: with samples at least a grid step apart, every piece of f that reaches into the cell holds such a step.
-double error_between_samples(std::span<const double> heights) {
-  assert(heights.size() == static_cast<std::size_t>(kFineSide) * static_cast<std::size_t>(kFineSide));
-  const auto at = [&](int x, int y) { return heights[static_cast<std::size_t>(y * kFineSide + x)]; };
-  double largest = 0.0;
-  for (int row = 0; row < kCells; ++row) {
-    for (int column = 0; column < kCells; ++column) {
-      Range per_column, per_row;
-      for (int y = 2 * row; y <= 2 * row + 4; ++y) {
-        for (int x = 2 * column; x < 2 * column + 4; ++x) per_column.add(at(x + 1, y) - at(x, y));
-      }
-      for (int y = 2 * row; y < 2 * row + 4; ++y) {
-        for (int x = 2 * column; x <= 2 * column + 4; ++x) per_row.add(at(x, y + 1) - at(x, y));
-      }
-      largest = std::max(largest, per_column.width() + per_row.width());
-    }
-  }
-  return largest / 2.0;  // a quarter, of differences per half step
-}
-
 Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key,
                                     const MeshSettings& settings, std::stop_token stop) {
   const TileFacts known = facts.facts_of(key);
   Result<HeightField> field =
-      known.height_error ? known_field(model, key, static_cast<double>(*known.height_error)) : measured_field(model, key);
+      known.height_error ? field_of_known_error(model, key, static_cast<double>(*known.height_error)) : field_of_finest_data(model, key);
   if (!field) return field.error();
   if (!known.height_error) field->error = std::min(field->error, error_of_ancestors(facts, key));
   if (stop.stop_requested()) return Error{ErrorCode::cancelled, "geometry of " + geo::to_string(key)};

@@ -2,7 +2,6 @@
 // A job of a worker: values and a stop token in, a result out.
 #pragma once
 
-#include <span>
 #include <stop_token>
 
 #include "base/result.h"
@@ -23,10 +22,5 @@ struct MeshSettings {
 /// grid is finer than they are) and the decimation's. Errors: those of reading, cancelled.
 Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key,
                                     const MeshSettings& settings = {}, std::stop_token stop = {});
-
-/// Bound of |surface - full triangulation of the tile's grid|, for a grid that is at least as fine as the samples that the
-/// surface is bilinear between. `heights` are samples of the surface at half the grid's spacing, one such step beyond
-/// every border of the tile: (2 * kGridSide + 1)^2 values.
-double error_between_samples(std::span<const double> heights);
 
 }  // namespace tellurion::surface
