@@ -69,6 +69,9 @@ struct OnPath {
   }
 };
 
+/// Where the sample of a column or row lies; two more on either side stand for the border and the end of the slope beyond it.
+double sample_place(int i, int size) { return i < 0 ? i + 1 : i >= size ? i : i + 0.5; }
+
 /// A sample of a raster, seen from the face.
 struct FaceSample {
   glm::dvec2 uv{NAN};
@@ -268,8 +271,12 @@ class Scanner {
   /// One row of the raster's samples: where they lie on the face, and the surface's height where that is on the leaf.
   Result<void> read_row(cache::CachedRaster& raster, int first, int y, int width, double ring) {
     const OnPath& leaf = path_.back();
-    const int columns = raster.description().levels.front().width;
-    const auto pixel = [&](int i) { return glm::dvec2((first + i) % columns + 0.5, y + 0.5); };
+    const source::LevelSize size = raster.description().levels.front();
+    const bool wraps = raster.description().wraps;
+    const double pixel_y = sample_place(y, size.height);
+    const auto pixel = [&](int i) {
+      return glm::dvec2(wraps ? (first + i) % size.width + 0.5 : sample_place(first + i, size.width), pixel_y);
+    };
     row_.assign(static_cast<std::size_t>(width), {});
 
     // Whole runs lie beside the leaf: told by their ends.
@@ -316,7 +323,7 @@ class Scanner {
     projected_.assign(pixels_.size(), glm::dvec2(NAN));
     raster.reader().to_places(pixels_, places_);
     for (std::size_t i = 0; i < places_.size(); ++i) {
-      if (!std::isfinite(places_[i].latitude.value) || !std::isfinite(places_[i].longitude.value)) continue;
+      if (!(std::abs(places_[i].latitude.value) <= std::numbers::pi / 2.0) || !std::isfinite(places_[i].longitude.value)) continue;
       const std::optional<glm::dvec2> uv = geo::project_to_face(path_.back().key.face, geo::normal_at(places_[i]));
       if (uv) projected_[i] = *uv;
     }
@@ -333,7 +340,7 @@ class Scanner {
     std::transform(normals.begin(), normals.end(), places_.begin(), geo::place_of_normal);
     raster.reader().to_pixels(places_, pixels_);
 
-    const source::PixelWindow everything{0, 0, size.width, size.height};
+    const source::PixelWindow everything{about.wraps ? 0 : -2, -2, size.width + (about.wraps ? 0 : 4), size.height + 4};
     glm::dvec2 low(INFINITY), high(-INFINITY);
     bool all_columns = false;
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
@@ -351,7 +358,7 @@ class Scanner {
     const glm::dvec2 spare = (high - low) / 16.0 + 3.0;
     low = glm::floor(low - spare);
     high = glm::ceil(high + spare);
-    const auto clamped = [](double value, int most) { return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most))); };
+    const auto clamped = [](double value, int most) { return static_cast<int>(std::clamp(value, -2.0, most + 2.0)); };
     source::PixelWindow window;
     window.y = clamped(low.y, size.height);
     window.height = clamped(high.y, size.height) - window.y;
@@ -454,6 +461,10 @@ ErrorTable merge_scans(std::span<const SubtreeScan> scans) {
         tree.nodes().push_back(moved);
       }
     }
+  }
+  // The levels above the jobs' roots know only what lies below them.
+  for (std::size_t node = tree.size(); node-- > 0;) {
+    for (std::size_t i = 0; tree[node].children != 0 && i < 4; ++i) include(tree[node].record, tree[tree[node].children + i].record);
   }
   return ErrorTable(std::move(tree));
 }
