@@ -204,7 +204,7 @@ void Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   if (!s.store.upload_geometry(thread, key, triangle_before(camera))) return;
   DrawTile tile{.key = key, .colour_owner = key, .colour_before = key, .slope_owner = key};
   DrawTile fading = tile;
-  fading.colour_before.level = 1;
+  fading.colour_before.face = 0;
   fading.fade = 0.5f;
   const DrawTile tiles[] = {tile, fading};
   Target target(GL_RGBA8, look.antialiasing ? std::min(kSamples, thread.capabilities().max_samples) : 1);
@@ -217,6 +217,7 @@ void Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
 FrameFigures Renderer::draw(gpu::RenderThread& thread, const view::Camera& camera, const FrameLook& look,
                             std::span<const DrawTile> tiles, unsigned framebuffer) {
   thread.check();
+  if (camera.width <= 0 || camera.height <= 0) return {};  // a minimised window
   const FrameFigures figures = state_->draw_plain(thread, camera, look, tiles);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->plain.framebuffer());
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);

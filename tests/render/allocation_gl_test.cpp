@@ -14,9 +14,15 @@
 namespace {
 
 thread_local std::size_t allocations = 0;
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kCounts = false;  // the sanitizer needs its own operator new
+#else
+constexpr bool kCounts = true;
+#endif
 
 }  // namespace
 
+#if !defined(__SANITIZE_ADDRESS__)
 // The other forms of new and delete call these.
 void* operator new(std::size_t size) {
   ++allocations;
@@ -26,6 +32,7 @@ void* operator new(std::size_t size) {
 
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#endif
 
 using namespace tellurion;
 using namespace tellurion::render;
@@ -33,7 +40,7 @@ using namespace tellurion::render::test;
 
 TEST_CASE("draw: allocates nothing in steady state, whatever the look") {
   Stage stage(gpu::Api::core);
-  auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker);
+  auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker, 64);
   tiles[0].colour_before = tiles[1].key;
   tiles[0].fade = 0.5f;
   const gpu::Framebuffer framebuffer(*stage.thread);
@@ -60,5 +67,5 @@ TEST_CASE("draw: allocates nothing in steady state, whatever the look") {
   }
   const std::size_t before = allocations;
   CHECK(std::make_unique<int>(1) != nullptr);
-  CHECK(allocations > before);  // the count counts
+  CHECK((allocations > before) == kCounts);
 }

@@ -73,7 +73,7 @@ TEST_CASE("picture: OpenGL, OpenGL ES and a context without clip control agree")
   for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, ""}, {gpu::Api::core, "clip_control"},
                                      {gpu::Api::es, "clip_control"}}) {
     Stage stage(api, without);
-    const auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker);
+    const auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker, 64);
     for (std::size_t i = 0; i < 2; ++i) pictures[i].push_back(stage.picture(cameras[i], look, tiles));
   }
   for (const auto& same : pictures) {
@@ -193,7 +193,7 @@ TEST_CASE("measure: heights, places and distances agree with the analytic ellips
   for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
     Stage stage(api, without);
     for (const View& v : views) {
-      INFO(v.pose, " without ", without);
+      INFO(v.pose, ", OpenGL ES: ", stage.thread->capabilities().is_es);
       const view::Camera camera = camera_at(v.pose);
       const auto place = geo::place_of(view::parse_pose(v.pose)->position);
       std::vector<DrawTile> tiles;
@@ -312,7 +312,7 @@ TEST_CASE("upload: a part that is there already is replaced") {
 TEST_CASE("draw: lines, boxes, borders and smooth edges show, and go again") {
   for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
     Stage stage(api, without);
-    const auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker);
+    const auto tiles = upload_level(*stage.thread, *stage.renderer, geo::kWgs84, 1, flat, checker, 64);
     const view::Camera camera = camera_at("30,20,9000000");
     const auto plain = stage.picture(camera, bare_look(), tiles);
     const auto share = [&](bool FrameLook::* feature) {

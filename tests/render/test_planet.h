@@ -55,15 +55,17 @@ inline surface::TileGeometry exact_geometry(const geo::Ellipsoid& ellipsoid, con
   return geometry;
 }
 
-/// One opaque patch over the whole slot, gutter included, sampled at its texels' centres.
-inline surface::TileImagery exact_imagery(const geo::TileKey& key, const ColourFunction& colour) {
-  constexpr int kSide = surface::kColourSlotSide;
-  constexpr double kInner = kSide - 2 * surface::kColourGutter;
+/// One opaque patch over the whole slot, gutter included: an image of `side`, sampled at its texels' centres.
+inline surface::TileImagery exact_imagery(const geo::TileKey& key, const ColourFunction& colour,
+                                          int side = surface::kColourSlotSide) {
+  constexpr double kInner = surface::kColourSlotSide - 2 * surface::kColourGutter;
+  const double step = static_cast<double>(surface::kColourSlotSide) / side;
   surface::ImagePatch patch;
-  patch.image = {kSide, kSide, {}};
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      const glm::dvec2 st((x + 0.5 - surface::kColourGutter) / kInner, (y + 0.5 - surface::kColourGutter) / kInner);
+  patch.image = {side, side, {}};
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const glm::dvec2 st(((x + 0.5) * step - surface::kColourGutter) / kInner,
+                          ((y + 0.5) * step - surface::kColourGutter) / kInner);
       const glm::dvec3 c = colour(geo::tile_normal(key, st));
       for (int i = 0; i < 3; ++i) patch.image.rgba.push_back(static_cast<std::uint8_t>(std::lround(255.0 * c[i])));
       patch.image.rgba.push_back(255);
@@ -96,11 +98,12 @@ inline std::vector<geo::TileKey> tiles_of_level(int level) {
 /// Uploads all of a level and returns what to draw.
 inline std::vector<surface::DrawTile> upload_level(gpu::RenderThread& thread, Renderer& renderer,
                                                    const geo::Ellipsoid& ellipsoid, int level, const HeightFunction& height,
-                                                   const ColourFunction& colour) {
+                                                   const ColourFunction& colour,
+                                                   int image_side = surface::kColourSlotSide) {
   std::vector<surface::DrawTile> tiles;
   for (const geo::TileKey& key : tiles_of_level(level)) {
     REQUIRE(renderer.upload_geometry(thread, key, exact_geometry(ellipsoid, key, height)));
-    REQUIRE(renderer.upload_colour(thread, key, exact_imagery(key, colour)));
+    REQUIRE(renderer.upload_colour(thread, key, exact_imagery(key, colour, image_side)));
     tiles.push_back(draw_alone(key));
   }
   return tiles;
