@@ -1,0 +1,292 @@
+// Patches, drawn as a renderer draws them, against the source looked up directly.
+#include "surface/image_patches.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "source/gdal/gdal_source.h"
+#include "surface/control_grid.h"
+#include "surface/made_world.h"
+#include "surface/tile_grid.h"
+
+using namespace tellurion;
+using namespace tellurion::surface;
+using namespace tellurion::surface::testing;
+
+namespace {
+
+/// A surface of colour layers and a model of it.
+struct Pictures {
+  std::shared_ptr<SurfaceDescription> description = std::make_shared<SurfaceDescription>();
+  cache::BlockCache blocks{std::size_t{128} << 20};
+  std::optional<ColourModel> model;
+
+  explicit Pictures(std::vector<Layer> colours) {
+    description->ellipsoid = geo::kWgs84;
+    description->colours = std::move(colours);
+    model.emplace(std::move(ColourModel::open(description, blocks)).value());
+  }
+  TileImagery of(const geo::TileKey& key) { return std::move(build_imagery(*model, key)).value(); }
+};
+
+/// Bilinear colour of an image at texture coordinates, clamped at its edges.
+glm::dvec4 sampled(const raster::Image& image, glm::dvec2 at) {
+  const glm::dvec2 p = at * glm::dvec2(image.width, image.height) - 0.5;
+  const glm::dvec2 corner = glm::floor(p), share = p - corner;
+  glm::dvec4 sum(0);
+  for (int i = 0; i < 4; ++i) {
+    const int x = std::clamp(static_cast<int>(corner.x) + (i & 1), 0, image.width - 1);
+    const int y = std::clamp(static_cast<int>(corner.y) + (i >> 1), 0, image.height - 1);
+    const auto c = image.at(x, y);
+    sum += ((i & 1) ? share.x : 1 - share.x) * ((i >> 1) ? share.y : 1 - share.y) * glm::dvec4(c[0], c[1], c[2], c[3]);
+  }
+  return sum;
+}
+
+/// What a patch draws at tile coordinates; nothing outside of it.
+std::optional<glm::dvec4> drawn(const ImagePatch& patch, glm::dvec2 st) {
+  const glm::dvec2 at = (st - glm::dvec2(patch.lower)) / glm::dvec2(patch.upper - patch.lower) * glm::dvec2(patch.columns, patch.rows);
+  if (at.x < 0 || at.y < 0 || at.x > patch.columns || at.y > patch.rows) return std::nullopt;
+  const int column = std::min(static_cast<int>(at.x), patch.columns - 1), row = std::min(static_cast<int>(at.y), patch.rows - 1);
+  const glm::dvec2 share = at - glm::dvec2(column, row);
+  const auto point = [&](int x, int y) { return glm::dvec2(patch.image_points[static_cast<std::size_t>(y * (patch.columns + 1) + x)]); };
+  const glm::dvec2 upper = glm::mix(point(column, row), point(column + 1, row), share.x);
+  const glm::dvec2 lower = glm::mix(point(column, row + 1), point(column + 1, row + 1), share.x);
+  return sampled(patch.image, glm::mix(upper, lower, share.y));
+}
+
+/// A slot after all patches, each over the ones before.
+glm::dvec4 composed(const TileImagery& imagery, glm::dvec2 st) {
+  glm::dvec4 slot(0);
+  for (const ImagePatch& patch : imagery.patches) {
+    if (const auto colour = drawn(patch, st)) slot = *colour * static_cast<double>(patch.opacity) + slot * (1 - static_cast<double>(patch.opacity) * colour->w / 255);
+  }
+  return slot;
+}
+
+/// Colours that are smooth over the sphere, poles and antimeridian included: the normal itself.
+glm::dvec4 normal_colour(const glm::dvec3& n) { return {127.5 + 120 * n.x, 127.5 + 120 * n.y, 127.5 + 120 * n.z, 255}; }
+
+MadeRaster normals_picture(int width, double west = -180, double east = 180) {
+  MadeRaster made;
+  made.width = width, made.height = width / 2;
+  made.west = west, made.east = east;
+  made.colour = [width, west](int x, int y) {
+    const glm::dvec3 n = geo::normal_at(at(90 - (y + 0.5) * 360.0 / width, west + (x + 0.5) * 360.0 / width)).xyz;
+    const glm::dvec4 c = glm::round(normal_colour(n));
+    return std::array<std::uint8_t, 4>{static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z), 255};
+  };
+  return made;
+}
+
+glm::dvec2 slot_st(double x, double y) { return (glm::dvec2(x, y) - static_cast<double>(kColourGutter)) / (256.0 - 2 * kColourGutter); }
+
+}  // namespace
+
+TEST_CASE("map_slot: places between control points err by less than a third of a texel, all over the planet") {
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  const std::string shared = TELLURION_SHARED_DATA_DIR;
+  std::vector<std::unique_ptr<source::RasterSource>> sources;
+  sources.push_back(std::make_unique<MadeSource>(normals_picture(8192)));
+  sources.push_back(std::make_unique<MadeSource>(normals_picture(4096, 0, 360)));
+  for (const char* file : {"/earth/elevation/arctic_polar_stereographic.tif", "/earth/regional/mosaic_cog1.tif"}) {
+    if (!std::filesystem::exists(shared + file)) continue;
+    auto opened = source::open_gdal({.path = shared + file}, geo::kWgs84);
+    REQUIRE(opened);
+    sources.push_back(std::move(*opened));
+  }
+  std::uniform_real_distribution<double> share(0, 1);
+  for (const auto& source : sources) {
+    const source::RasterDescription& about = source->description();
+    CAPTURE(about.name);
+    const auto reader = std::move(source->open_reader()).value();
+    int compared = 0;
+    for (int i = 0; i < 150; ++i) {
+      const int level = i % 10;
+      geo::TileKey key{static_cast<std::uint8_t>(random() % 6), static_cast<std::uint8_t>(level), 0, 0};
+      key.x = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
+      key.y = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
+      if (i % 4 == 0) {  // where the raster is
+        const double lat = about.bounds.south.value + share(random) * (about.bounds.north - about.bounds.south).value;
+        const double lon = about.bounds.west.value + share(random) * (about.bounds.east - about.bounds.west).value;
+        key = geo::tile_at(geo::normal_at({Radians(lat), Radians(lon)}), level);
+      }
+      if (i % 4 == 1) key = geo::tile_at({{1e-9, 1e-9, i % 8 == 1 ? 1.0 : -1.0}}, level);
+      CAPTURE(geo::to_string(key));
+      const SlotMapping mapping = map_slot(geo::kWgs84, key, about, *reader);
+      for (int j = 0; j < 400; ++j) {
+        const glm::dvec2 st = slot_st(share(random) * 256, share(random) * 256);
+        const geo::Vector<geo::Ecef> normal = geo::tile_normal(key, st);
+        const geo::LatLon place = geo::place_of_normal(normal);
+        glm::dvec2 pixel;
+        reader->to_pixels({&place, 1}, {&pixel, 1});
+        const bool inside = pixel.x >= 0 && pixel.y >= 0 && pixel.x <= about.levels[0].width && pixel.y <= about.levels[0].height;
+        int grids = 0;
+        for (const ControlGrid& grid : mapping.grids) {
+          const glm::dvec2 in_grid = (st - grid.lower) / (grid.upper - grid.lower) * glm::dvec2(grid.columns, grid.rows);
+          if (in_grid.x < 0 || in_grid.y < 0 || in_grid.x >= grid.columns || in_grid.y >= grid.rows) continue;
+          ++grids;
+          if (!grid.follows || !inside) continue;
+          const int column = static_cast<int>(in_grid.x), row = static_cast<int>(in_grid.y);
+          const glm::dvec2 f = in_grid - glm::dvec2(column, row);
+          const auto point = [&](int x, int y) { return grid.pixels[static_cast<std::size_t>(y * (grid.columns + 1) + x)]; };
+          glm::dvec2 mapped = glm::mix(glm::mix(point(column, row), point(column + 1, row), f.x),
+                                       glm::mix(point(column, row + 1), point(column + 1, row + 1), f.x), f.y);
+          if (about.wraps) mapped.x -= about.levels[0].width * std::floor(mapped.x / about.levels[0].width);
+          geo::LatLon there;
+          reader->to_places({&mapped, 1}, {&there, 1});
+          const double off = glm::distance(geo::normal_at(there).xyz, normal.xyz) * geo::kWgs84.a();
+          // Texels are smallest, 0.7 of the nominal size, at the corners of a face.
+          REQUIRE(off < nominal_colour_texel(geo::kWgs84, level) / 3);
+          ++compared;
+        }
+        REQUIRE(grids <= 1);
+        if (inside) REQUIRE(grids == 1);
+      }
+    }
+    CHECK(compared > 1000);
+  }
+}
+
+TEST_CASE("build_imagery: the patches show the source everywhere, poles, antimeridian and gutters included") {
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0, 256);
+  for (const double west : {-180.0, 0.0}) {
+    Pictures pictures({layer_of(normals_picture(2048, west, west + 360), 1)});
+    std::vector<geo::TileKey> keys;
+    for (std::uint8_t face = 0; face < 6; ++face) keys.push_back({face, 0, 0, 0});
+    for (int level = 1; level <= 6; ++level) {
+      for (const double z : {1.0, -1.0}) keys.push_back(geo::tile_at({{1e-9, 1e-9, z}}, level));
+      keys.push_back(geo::tile_at(geo::normal_at(at(20, 179.999)), level));
+      keys.push_back(geo::tile_at(geo::normal_at(at(80 * std::sin(level), 50 * level)), level));
+    }
+    for (const geo::TileKey& key : keys) {
+      CAPTURE(geo::to_string(key));
+      const TileImagery imagery = pictures.of(key);
+      CHECK(imagery.patches.size() <= (key.level == 0 ? 40u : 12u));
+      double worst = 0;
+      for (int i = 0; i < 3000; ++i) {
+        const glm::dvec2 st = slot_st(share(random), share(random));
+        const glm::dvec4 expected = normal_colour(geo::tile_normal(key, st).xyz);
+        worst = std::max(worst, glm::distance(composed(imagery, st), expected));
+      }
+      // A texel or pixel off: at most 1.5 times 120 per radian and texel; rounding.
+      const double texel = std::max(geo::tile_angle(key.level).value / 248, 2 * kPi / 2048);
+      CHECK(worst < 2.0 + 1.5 * 120 * texel);
+      for (const ImagePatch& patch : imagery.patches) {
+        CHECK(patch.opaque);
+        CHECK(patch.image.width <= kLargestWindow);
+        CHECK(patch.image.height <= kLargestWindow);
+      }
+    }
+  }
+}
+
+TEST_CASE("build_imagery: windows have one to two pixels a texel on either axis where the source is fine enough") {
+  Pictures pictures({layer_of(normals_picture(8192), 1)});
+  for (const double latitude : {0.0, 30.0, 60.0, 75.0}) {
+    CAPTURE(latitude);
+    const geo::TileKey key = geo::tile_at(geo::normal_at(at(latitude, 20)), 3);
+    const TileImagery imagery = pictures.of(key);
+    REQUIRE(imagery.patches.size() == 1);
+    const ImagePatch& patch = imagery.patches[0];
+    const double texels = kColourSlotSide / 16.0;  // of a cell
+    const glm::dvec2 size(patch.image.width, patch.image.height);
+    std::vector<double> columns, rows;
+    for (int y = 0; y < patch.rows; ++y) {
+      for (int x = 0; x < patch.columns; ++x) {
+        const auto point = [&](int i, int j) { return glm::dvec2(patch.image_points[static_cast<std::size_t>(j * (patch.columns + 1) + i)]) * size; };
+        const glm::dvec2 ds = (point(x + 1, y) - point(x, y)) / texels, dt = (point(x, y + 1) - point(x, y)) / texels;
+        columns.push_back(std::hypot(ds.x, dt.x)), rows.push_back(std::hypot(ds.y, dt.y));
+      }
+    }
+    for (std::vector<double>* values : {&columns, &rows}) {
+      std::sort(values->begin(), values->end());
+      CHECK((*values)[values->size() / 2] >= 0.99);
+      CHECK((*values)[values->size() / 2] <= 2.01);
+    }
+  }
+}
+
+TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it all, voids are seen through") {
+  MadeRaster region;
+  region.width = region.height = 500;
+  region.west = 10, region.east = 20, region.south = 40, region.north = 50;
+  region.colour = [](int x, int y) {
+    return x > 240 && x < 260 && y > 240 && y < 260 ? std::array<std::uint8_t, 4>{0, 0, 0, 0} : std::array<std::uint8_t, 4>{200, 100, 50, 255};
+  };
+  Pictures pictures({layer_of(region, 1)});
+  CHECK(pictures.of(geo::tile_at(geo::normal_at(at(-45, 15)), 6)).patches.empty());
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0, 256);
+  int inside = 0, outside = 0, in_void = 0;
+  for (int level = 0; level <= 8; ++level) {
+    for (const auto& [lat, lon] : {std::pair(45.0, 15.0), std::pair(50.0, 14.0), std::pair(41.0, 20.0), std::pair(40.0, 10.0)}) {
+      const geo::TileKey key = geo::tile_at(geo::normal_at(at(lat, lon)), level);
+      CAPTURE(geo::to_string(key));
+      const TileImagery imagery = pictures.of(key);
+      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger.
+      const double blur = std::max(0.02, to_degrees(geo::tile_angle(level)).value / 248) * 4;
+      for (int i = 0; i < 2000; ++i) {
+        const glm::dvec2 st = slot_st(share(random), share(random));
+        const geo::LatLon place = geo::place_of_normal(geo::tile_normal(key, st));
+        const double latitude = to_degrees(place.latitude).value, longitude = to_degrees(place.longitude).value;
+        const double within = std::min({latitude - 40, 50 - latitude, longitude - 10, 20 - longitude});
+        const double from_void = std::max(std::abs(latitude - 45), std::abs(longitude - 15));
+        const glm::dvec4 colour = composed(imagery, st);
+        if (within < -blur) {
+          REQUIRE(colour == glm::dvec4(0));
+          ++outside;
+        } else if (within > blur && from_void > 0.2 + blur) {
+          REQUIRE(glm::distance(colour, glm::dvec4(200, 100, 50, 255)) < 1.01);
+          ++inside;
+        } else if (from_void < 0.18 - blur) {
+          REQUIRE(colour == glm::dvec4(0));
+          ++in_void;
+        }
+      }
+    }
+  }
+  CHECK(inside > 1000);
+  CHECK(outside > 1000);
+  CHECK(in_void > 300);
+}
+
+TEST_CASE("build_imagery: layers keep their order and settings; one that hides all below leaves them out") {
+  MadeRaster white = normals_picture(512), half = normals_picture(512);
+  half.colour = [](int, int) { return std::array<std::uint8_t, 4>{0, 64, 0, 128}; };
+  Layer below = layer_of(white, 1), middle = layer_of(half, 2), top = layer_of(white, 3);
+  middle.gamma = 2.0f, middle.multiplier = 0.5f;
+  const geo::TileKey key{0, 2, 1, 1};
+  const TileImagery both = Pictures({below, middle}).of(key);
+  REQUIRE(both.patches.size() == 2);
+  CHECK(both.patches[0].opaque);
+  CHECK(!both.patches[1].opaque);
+  CHECK(both.patches[1].gamma == 2.0f);
+  CHECK(both.patches[1].multiplier == 0.5f);
+  CHECK(Pictures({below, middle, top}).of(key).patches.size() == 1);
+  top.opacity = 0.5f;
+  const TileImagery all = Pictures({below, middle, top}).of(key);
+  REQUIRE(all.patches.size() == 3);
+  CHECK(!all.patches[2].opaque);
+  CHECK(all.patches[2].opacity == 0.5f);
+  top.enabled = false;
+  CHECK(Pictures({below, middle, top}).of(key).patches.size() == 2);
+}
