@@ -1,5 +1,6 @@
 #include "surface/elevation_model.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -170,6 +171,24 @@ TEST_CASE("surface_normal_at: leans by the gradient of the samples") {
   CHECK(-glm::dot(normal, east) / glm::dot(normal, up) == doctest::Approx(1000 / run).epsilon(1e-6));
   MadeWorld empty({});
   CHECK(empty.model->surface_normal_at(place)->xyz == up);
+}
+
+TEST_CASE("grid_normals: are those of tile_normal, to the bit on the borders of faces") {
+  for (std::uint8_t face = 0; face < 6; ++face) {
+    for (int level = 0; level < 6; ++level) {
+      const geo::TileKey key{face, static_cast<std::uint8_t>(level), (1u << level) - 1, 0};
+      const auto grid = grid_normals(key, 33, -0.25, 1.25);
+      for (std::size_t i = 0; i < grid.size(); ++i) {
+        const glm::dvec2 st = glm::dvec2(i % 33, i / 33) / 32.0 * 1.5 - 0.25;
+        REQUIRE(glm::distance(grid[i].xyz, geo::tile_normal(key, st).xyz) < 1e-15);
+      }
+      const auto whole = grid_normals(key, 65);
+      const auto beyond = grid_normals(geo::neighbour(key, geo::Side::east), 65);
+      int shared = 0;
+      for (const auto& normal : whole) shared += std::count(beyond.begin(), beyond.end(), normal) > 0;
+      REQUIRE(shared == 65);
+    }
+  }
 }
 
 TEST_CASE("grid_normals: tiles share their borders to the bit") {
