@@ -6,6 +6,7 @@
 #include <cctype>
 #include <glm/geometric.hpp>
 #include <optional>
+#include <utility>
 
 #include "viewer/window.h"
 
@@ -49,8 +50,10 @@ Input::Input(const Window& window) : window_(window) {
   glfwSetMouseButtonCallback(handle, [](GLFWwindow* w, int button, int action, int modifiers) {
     Input& self = of(w);
     const glm::dvec2 at = self.cursor();
+    // GLFW tells no times. Counted from the frame's beginning, slow frames do not tear double clicks apart.
+    const double time = self.reports_are_late_ ? self.waited_until_ : glfwGetTime();
     if (action == GLFW_PRESS)
-      self.reports_.emplace_back(Press{button, modifiers, at, glfwGetTime()});
+      self.reports_.emplace_back(Press{button, modifiers, at, time});
     else
       self.reports_.emplace_back(Release{button, at});
   });
@@ -120,6 +123,15 @@ void Input::press(const Press& press, std::vector<Event>& events) {
   }
   drag_button_ = press.button;
   events.emplace_back(DragStart{*drag, press.at});
+}
+
+void Input::wait(double seconds) {
+  const std::size_t known = reports_.size();
+  reports_are_late_ = true;
+  glfwPollEvents();
+  reports_are_late_ = false;
+  if (seconds > 0.0 && !activity_ && reports_.size() == known) glfwWaitEventsTimeout(seconds);
+  waited_until_ = glfwGetTime();
 }
 
 std::vector<Event> Input::take_events(bool mouse_taken, bool keyboard_taken) {

@@ -43,6 +43,9 @@ class Input {
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;
 
+  /// Lets the desktop report what has happened; waits up to `seconds` for the first report.
+  void wait(double seconds);
+
   /// Takes the events since the last call. `mouse_taken`, `keyboard_taken`: a panel has the mouse or the keyboard, so
   /// that nothing starts here; what has started goes on.
   std::vector<Event> take_events(bool mouse_taken, bool keyboard_taken);
@@ -79,6 +82,8 @@ class Input {
   bool activity_ = true;
   bool key_repeats_ = false;
   int drag_button_ = -1;
+  double waited_until_ = 0;
+  bool reports_are_late_ = false;  ///< they happened while a frame was drawn
   double last_press_time_ = -1e9;
   glm::dvec2 last_press_at_{0.0};
 };

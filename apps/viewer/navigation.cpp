@@ -40,6 +40,11 @@ glm::dvec2 middle_of(const view::Camera& camera) { return 0.5 * glm::dvec2(camer
 
 }  // namespace
 
+Radians compass_of(const view::Pose& pose) {
+  constexpr double kSteep = -80.0 * std::numbers::pi / 180.0;
+  return pose.pitch.value < kSteep ? pose.heading + pose.roll : pose.heading;
+}
+
 Navigation::Navigation(const geo::Ellipsoid& ellipsoid, const view::Camera& start, Pick pick)
     : ellipsoid_(ellipsoid), camera_(start), pick_(std::move(pick)) {}
 
@@ -182,7 +187,7 @@ void Navigation::step(Sliding& sliding, double seconds, const MotionSettings& se
 
 void Navigation::step(Settling& settling, double seconds) {
   const view::Pose pose = view::pose_of(ellipsoid_, camera_);
-  double turn = settling.to_north ? -std::remainder(pose.heading.value, 2.0 * std::numbers::pi) : 0.0;
+  double turn = settling.to_north ? -std::remainder(compass_of(pose).value, 2.0 * std::numbers::pi) : 0.0;
   double tilt = settling.to_nadir ? -std::numbers::pi / 2 - pose.pitch.value : 0.0;
   const bool done = std::abs(turn) < kSettled && std::abs(tilt) < kSettled;
   const double share = done ? 1.0 : share_of(seconds, kSettleSeconds);
@@ -224,7 +229,10 @@ void Navigation::turn_back_to_centre(double steps) {
       glm::smoothstep(0.2, 1.5, pose.position.height.value / ellipsoid_.a()) * (1.0 - std::exp(-0.3 * steps));
   if (share <= 0.0) return;
   const glm::dmat3 down = view::axes_of({pose.position, Radians(0.0), Radians(-std::numbers::pi / 2), Radians(0.0)});
-  camera_.axes = glm::mat3_cast(glm::normalize(glm::slerp(glm::quat_cast(camera_.axes), glm::quat_cast(down), share)));
+  const glm::dquat from = glm::quat_cast(camera_.axes), to = glm::quat_cast(down);
+  constexpr double kThere = 1.0 - 1e-6;  // a sixth of a degree
+  const bool there = std::abs(glm::dot(from, to)) > kThere;
+  camera_.axes = there ? down : glm::mat3_cast(glm::normalize(glm::slerp(from, to, share)));
 }
 
 void Navigation::step_keys(double seconds, glm::dvec3 held, EllipsoidalHeight ground, const MotionSettings& settings) {

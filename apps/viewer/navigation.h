@@ -13,6 +13,10 @@
 
 namespace tellurion::apps {
 
+/// Where the picture's upper edge points, clockwise from north. Looking down, heading and roll turn about the same
+/// axis.
+Radians compass_of(const view::Pose& pose);
+
 class Navigation {
  public:
   /// The displayed ground under a pixel; nothing for the sky. Asked once for each gesture.

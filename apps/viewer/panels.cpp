@@ -94,7 +94,7 @@ std::string status_text(const globe::FrameStats& stats, const Moment& moment) {
     if (moment.cursor_height_m) text += fmt::format("  {:.0f} m", *moment.cursor_height_m);
     text += "   |   ";
   }
-  const double heading = std::fmod(to_degrees(moment.pose.heading).value + 360.0, 360.0);
+  const double heading = std::fmod(to_degrees(moment.compass).value + 360.0, 360.0);
   text +=
       fmt::format("eye {}  heading {:.0f}\xC2\xB0  tilt {:.0f}\xC2\xB0", text_of_metres(moment.height_above_ground_m),
                   heading, to_degrees(moment.pose.pitch).value + 90.0);

@@ -84,7 +84,7 @@ Result<void> Viewer::open_logs() {
 void Viewer::run() {
   double last = seconds_now();
   while (!window_.should_close()) {
-    window_.wait_for_events(resting_seconds(last));
+    input_.wait(resting_seconds(last));
     const double now = seconds_now();
     advance_clock(now - last);
     if (input_.take_activity()) frames_owed_ = kSettlingFrames;
@@ -167,6 +167,7 @@ Moment Viewer::moment(double now) const {
   Moment moment;
   const view::Camera& camera = navigation_->camera();
   moment.pose = view::pose_of(globe_->ellipsoid(), camera);
+  moment.compass = compass_of(moment.pose);
   moment.height_above_ground_m = moment.pose.position.height.value - ground_.value;
   const auto forward = camera.forward();
   const double distance = geo::intersect_ray(globe_->ellipsoid(), Metres(ground_.value), camera.eye, forward);

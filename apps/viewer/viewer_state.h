@@ -42,6 +42,7 @@ struct ViewerState {
 /// What only the moment knows, for the panels.
 struct Moment {
   view::Pose pose;
+  Radians compass;  ///< where the picture's upper edge points, clockwise from north
   double height_above_ground_m = 0;
   double metres_per_pixel = 0;            ///< at the middle of the picture; 0: the sky is there
   std::optional<geo::LatLon> cursor;      ///< where it points, about; nothing: the sky

@@ -80,11 +80,4 @@ glm::dvec2 Window::scale() const {
 
 void Window::show_frame() { glfwSwapBuffers(handle()); }
 
-void Window::wait_for_events(double seconds) {
-  if (seconds > 0.0)
-    glfwWaitEventsTimeout(seconds);
-  else
-    glfwPollEvents();
-}
-
 }  // namespace tellurion::apps

@@ -28,8 +28,6 @@ class Window {
   /// Pixels of the picture for one unit of the desktop's cursor positions.
   glm::dvec2 scale() const;
   void show_frame();
-  /// Handles what the desktop has reported; waits up to `seconds` for the first report.
-  void wait_for_events(double seconds);
 
  private:
   struct Closer {

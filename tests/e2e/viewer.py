@@ -31,7 +31,7 @@ def run_on_display_in_memory():
         print(f"skipped: {', '.join(missing)} missing (tools/setup.sh --test installs them)")
         sys.exit(77)
     os.environ["TELLURION_ON_XVFB"] = "1"
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24 -nolisten tcp", sys.executable, *sys.argv])
+    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24 -nolisten tcp -r", sys.executable, *sys.argv])
 
 
 def ask_to_close(window):
@@ -74,6 +74,7 @@ class Viewer:
 
     def do(self, *words):
         """Runs words of xdotool."""
+        self.frames_before = self.frames()
         subprocess.run(["xdotool", *map(str, words)], check=True, timeout=60)
 
     def at(self, point):
@@ -92,14 +93,11 @@ class Viewer:
         self.settle()
 
     def wheel(self, steps, point):
-        self.do(*self.at(point), "sleep", HELD)
-        for _ in range(abs(steps)):
-            self.do("click", 4 if steps > 0 else 5, "sleep", "0.05")
+        self.do(*self.at(point), "sleep", HELD, *["click", 4 if steps > 0 else 5, "sleep", "0.05"] * abs(steps))
         self.settle()
 
     def key(self, *names):
-        for name in names:
-            self.do("key", name, "sleep", "0.05")
+        self.do(*(word for name in names for word in ("key", name, "sleep", "0.05")))
         self.settle()
 
     def hold(self, key, seconds):
@@ -110,17 +108,18 @@ class Viewer:
         return max(len(self.log.read_text().splitlines()) - 1, 0) if self.log.exists() else 0
 
     def settle(self, timeout=120):
-        """Waits until the picture is complete and no more frames are drawn."""
+        """Waits until the picture is complete and no more frames are drawn; at least one must come after the last action."""
         end = time.monotonic() + timeout
-        count, since = -1, time.monotonic()
+        count, since = self.frames_before, time.monotonic()
         while time.monotonic() < end:
             if self.process.poll() is not None:
                 raise AssertionError(f"ended with status {self.process.returncode}: {self.process.stderr.read()}")
             now = self.frames()
             if now != count:
                 count, since = now, time.monotonic()
-            elif now > 0 and time.monotonic() - since > 0.7 and self.figures()["complete"] == 1.0:
-                return
+            elif now > self.frames_before and self.figures()["complete"] == 1.0:
+                if time.monotonic() - since > max(0.7, 5e-3 * self.figures()["frame_ms"]):
+                    return
             time.sleep(0.05)
         raise AssertionError(f"still not at rest after {timeout} s: {self.figures()}")
 
@@ -213,7 +212,7 @@ class Picture(WindowTest):
     def test_keys_switch_parts_of_the_picture_and_back(self):
         viewer = self.open(ALPS)
         before = viewer.screen("before")
-        for key, least_share in (("l", 0.05), ("o", 0.05), ("f", 0.3), ("b", 0.002), ("t", 0.002)):
+        for key, least_share in (("l", 0.05), ("o", 0.05), ("f", 0.1), ("b", 0.002), ("t", 0.002)):
             viewer.key(key)
             changed = np.abs(viewer.screen(f"key_{key}") - before).max(axis=-1) > 8
             self.assertGreater(changed.mean(), least_share, f"{key} changes the picture")
@@ -297,10 +296,11 @@ class Motion(WindowTest):
         viewer = self.open((45.0, 8.0, 1e6, 70.0, -40.0))
         for _ in range(4):
             viewer.wheel(-10, MIDDLE)
-        _, _, height, heading, pitch, _ = viewer.pose()
+        lat, lon, height, *_ = viewer.pose()
         self.assertGreater(height, 1e7)
-        self.assertLess(abs((heading + 180.0) % 360.0 - 180.0), 3.0)
-        self.assertLess(pitch, -87.0)
+        camera, level = viewer.camera(), Camera(EARTH, (lat, lon, height, 0.0, 0.0), SIZE)
+        self.assertLess(np.degrees(angle_between(camera.forward, -level.up)), 2.0)
+        self.assertLess(np.degrees(angle_between(camera.up, level.forward)), 2.0)
 
     def test_the_right_button_tilts_about_the_place_under_the_cursor(self):
         viewer = self.open((45.5, 8.0, 250e3, 0.0, -80.0))
@@ -367,7 +367,7 @@ class Motion(WindowTest):
 
     def test_the_eye_stays_above_the_ground(self):
         viewer = self.open((45.97, 7.66, 9000.0, 0.0, -20.0))
-        viewer.hold("q", 4.0)
+        viewer.hold("q", 8.0)
         time.sleep(1.0)
         lat, lon, height, *_ = viewer.pose()
         ground = float(self.elevation.bilinear(lat, lon))
