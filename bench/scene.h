@@ -46,7 +46,7 @@ struct Scene {
 };
 Result<Scene> open_scene(globe::World world, const Setting& setting);
 
-/// Errors: unavailable, if the picture is not finished within two minutes.
+/// Errors: unavailable, if the picture is not finished within five minutes.
 Result<void> finish(Scene& scene, const view::Camera& camera, const globe::ViewSettings& settings);
 
 /// Degrees and metres above the ellipsoid.

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <chrono>
 #include <cstddef>
+#include <ctime>
 #include <vector>
 
 namespace tellurion::bench {
@@ -17,6 +18,21 @@ class Stopwatch {
  private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
+};
+
+/// The processor's time spent on this thread: other programs do not count.
+class CpuStopwatch {
+ public:
+  double seconds() const { return now() - start_; }
+  double ms() const { return seconds() * 1e3; }
+
+ private:
+  static double now() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
+  }
+  double start_ = now();
 };
 
 /// The value below which `share` of `values` lie. Requires at least one value.
