@@ -37,11 +37,12 @@ inline double interpolate_in_triangles(std::span<const double> heights, int side
   const double fx = x - column, fy = y - row;
   const double* cell = heights.data() + static_cast<std::size_t>(row * side + column);
   const double h00 = cell[0], h10 = cell[1], h01 = cell[side], h11 = cell[side + 1];
-  if (runs_down_right(column, row)) {
-    return fx >= fy ? h00 + fx * (h10 - h00) + fy * (h11 - h10) : h00 + fy * (h01 - h00) + fx * (h11 - h01);
-  }
-  return fx + fy <= 1.0 ? h00 + fx * (h10 - h00) + fy * (h01 - h00)
-                        : h11 + (1.0 - fx) * (h01 - h11) + (1.0 - fy) * (h10 - h11);
+  const bool down_right = runs_down_right(column, row);
+  const bool at_top = down_right ? fx >= fy : fx + fy <= 1.0;  // in the triangle that has the cell's upper edge
+  const double per_x = at_top ? h10 - h00 : h11 - h01;
+  const double per_y = down_right == at_top ? h11 - h10 : h01 - h00;
+  const double start = down_right || at_top ? h00 : h01 + h10 - h11;
+  return start + fx * per_x + fy * per_y;
 }
 
 /// Errors by the criterion of @mapbox/martini: at every point the distance between its height and the mean of its
