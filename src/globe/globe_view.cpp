@@ -99,8 +99,8 @@ struct GlobeView::State {
   FrameStats stats;
 
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
-  void ask(const geo::TileKey& key, Part part);
-  bool submit(const geo::TileKey& key, Part part);
+  void ask(const surface::TileRequest& request);
+  bool submit(const geo::TileKey& key, Part part, double parent_error);
   void take_over(double upload_ms);
   void take_over(Finished item);
   Result<void> upload(const Finished& item);
@@ -109,12 +109,12 @@ struct GlobeView::State {
   Result<void> load_roots();
 };
 
-bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
-  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part,
+bool GlobeView::State::submit(const geo::TileKey& key, Part part, double parent_error) {
+  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part, parent_error,
                            token = stop.get_token()](SurfaceWorker& worker) {
     Finished item{key, part, {}};
     if (part == Part::geometry) {
-      auto geometry = worker.build_geometry(surface, *facts, key, token);
+      auto geometry = worker.build_geometry(surface, *facts, key, parent_error, token);
       if (geometry) item.content = std::move(*geometry);
       else item.content = geometry.error();
     } else {
@@ -126,11 +126,11 @@ bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
   });
 }
 
-void GlobeView::State::ask(const geo::TileKey& key, Part part) {
-  if (!submit(key, part)) return;
+void GlobeView::State::ask(const surface::TileRequest& request) {
+  if (!submit(request.key, request.part, request.parent_error)) return;
   ++in_flight;
   ++stats.requests;
-  tree.started(key, part);
+  tree.started(request.key, request.part);
 }
 
 bool GlobeView::State::make_room(Part part) {
@@ -203,7 +203,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
 
   for (const surface::TileRequest& request : selection->requests) {
     if (in_flight >= max_in_flight) break;
-    ask(request.key, request.part);
+    ask(request);
   }
 
   const surface::SelectionStats& s = selection->stats;
@@ -230,7 +230,7 @@ Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& k
   nothing->ellipsoid = globe.ellipsoid();
   cache::BlockCache no_blocks(0);
   SurfaceWorker worker(no_blocks);
-  return worker.build_geometry(std::move(nothing), *facts, key, {});
+  return worker.build_geometry(std::move(nothing), *facts, key, 0.0, {});
 }
 
 Result<void> GlobeView::State::load_roots() {
@@ -240,7 +240,7 @@ Result<void> GlobeView::State::load_roots() {
   for (const Part part : {Part::geometry, Part::colour}) {
     for (int face = 0; face < geo::kFaceCount; ++face) {
       const geo::TileKey root{static_cast<std::uint8_t>(face), 0, 0, 0};
-      while (!submit(root, part)) {
+      while (!submit(root, part, 0.0)) {
         if (!globe.run_one()) std::this_thread::yield();
       }
       tree.started(root, part);

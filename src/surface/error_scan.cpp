@@ -18,6 +18,7 @@
 #include "surface/height_field.h"
 #include "surface/rtin.h"
 #include "surface/tile_grid.h"
+#include "surface/tile_samples.h"
 
 namespace tellurion::surface {
 namespace {
@@ -179,18 +180,18 @@ class Scanner {
       if (Result<void> scanned = scan_raster(model_.raster(i), is_finest); !scanned) return scanned;
       some_raster_ends = some_raster_ends || !source.description().wraps;
     }
-    return compare_half_steps(some_raster_ends);
+    return compare_parts_of_steps(some_raster_ends);
   }
 
-  Result<void> compare_half_steps(bool inside_too) {
-    constexpr int kLast = 2 * (kGridSide - 1);
+  Result<void> compare_parts_of_steps(bool inside_too) {
+    const int last = (inside_too ? 4 : 2) * (kGridSide - 1);  // where a raster ends, cells are cut: quarters of a step there
     const OnPath& leaf = path_.back();
     std::vector<glm::dvec2> uv;
     std::vector<geo::Vector<geo::Ecef>> normals;
-    for (int y = 0; y <= kLast; ++y) {
-      const bool whole_row = inside_too || y == 0 || y == kLast;
-      for (int x = 0; x <= kLast; x += whole_row ? 1 : kLast) {
-        uv.push_back(leaf.rect.lower + (leaf.rect.upper - leaf.rect.lower) * (glm::dvec2(x, y) / static_cast<double>(kLast)));
+    for (int y = 0; y <= last; ++y) {
+      const bool whole_row = inside_too || y == 0 || y == last;
+      for (int x = 0; x <= last; x += whole_row ? 1 : last) {
+        uv.push_back(leaf.rect.lower + (leaf.rect.upper - leaf.rect.lower) * (glm::dvec2(x, y) / static_cast<double>(last)));
         normals.push_back(geo::face_normal(leaf.key.face, uv.back()));
       }
     }
@@ -213,15 +214,15 @@ class Scanner {
   /// Compares all samples of a raster within the leaf with the whole path; and the surface between them, if nothing finer
   /// shapes it.
   Result<void> scan_raster(cache::CachedRaster& raster, bool is_finest) {
-    const std::optional<source::PixelWindow> window = window_under_leaf(raster);
-    if (!window) return {};
+    const source::PixelWindow window = window_under(raster.reader(), raster.description(), path_.back().key);
+    if (window.width <= 0 || window.height <= 0) return {};
     // Samples just outside shape the surface within: three of them, in face coordinates.
     const double quarter = model_.description().ellipsoid.b() * std::numbers::pi / 4.0;
     const double ring = 3.0 * raster.description().spacing.value / quarter;
-    const auto width = static_cast<std::size_t>(window->width);
+    const auto width = static_cast<std::size_t>(window.width);
     above_.assign(width, {});
-    for (int row = 0; row < window->height; ++row) {
-      if (Result<void> read = read_row(raster, window->x, window->y + row, window->width, ring); !read) return read;
+    for (int row = 0; row < window.height; ++row) {
+      if (Result<void> read = read_row(raster, window.x, window.y + row, window.width, ring); !read) return read;
       for (std::size_t x = 0; x < width; ++x) {
         FaceSample& here = row_[x];
         if (here.within) compare_sample(here);
@@ -329,52 +330,6 @@ class Scanner {
     }
   }
 
-  /// Columns and rows that hold all samples within the leaf and round it; x may run past the raster's width where it wraps.
-  std::optional<source::PixelWindow> window_under_leaf(cache::CachedRaster& raster) {
-    constexpr int kSide = 17;
-    const source::RasterDescription& about = raster.description();
-    const source::LevelSize size = about.levels.front();
-    const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(path_.back().key, kSide);
-    places_.resize(normals.size());
-    pixels_.resize(normals.size());
-    std::transform(normals.begin(), normals.end(), places_.begin(), geo::place_of_normal);
-    raster.reader().to_pixels(places_, pixels_);
-
-    const source::PixelWindow everything{about.wraps ? 0 : -2, -2, size.width + (about.wraps ? 0 : 4), size.height + 4};
-    glm::dvec2 low(INFINITY), high(-INFINITY);
-    bool all_columns = false;
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      glm::dvec2& pixel = pixels_[i];
-      if (!std::isfinite(pixel.x) || !std::isfinite(pixel.y)) return everything;
-      if (about.wraps && i > 0) {
-        // Round a pole, steps are long; elsewhere they are a small part of the way round.
-        const double before = pixels_[i % kSide > 0 ? i - 1 : i - kSide].x;
-        pixel.x -= size.width * std::round((pixel.x - before) / size.width);
-        all_columns = all_columns || std::abs(pixel.x - before) > size.width / 8.0;
-      }
-      low = glm::min(low, pixel);
-      high = glm::max(high, pixel);
-    }
-    const glm::dvec2 spare = (high - low) / 16.0 + 3.0;
-    low = glm::floor(low - spare);
-    high = glm::ceil(high + spare);
-    const auto clamped = [](double value, int most) { return static_cast<int>(std::clamp(value, -2.0, most + 2.0)); };
-    source::PixelWindow window;
-    window.y = clamped(low.y, size.height);
-    window.height = clamped(high.y, size.height) - window.y;
-    if (!about.wraps) {
-      window.x = clamped(low.x, size.width);
-      window.width = clamped(high.x, size.width) - window.x;
-    } else if (all_columns || high.x - low.x >= size.width) {
-      window.width = size.width;
-    } else {
-      window.x = static_cast<int>(low.x - size.width * std::floor(low.x / size.width));
-      window.width = static_cast<int>(high.x - low.x);
-    }
-    if (window.width <= 0 || window.height <= 0) return std::nullopt;
-    return window;
-  }
-
   ElevationModel& model_;
   std::stop_token stop_;
   std::vector<OnPath> path_;
@@ -405,7 +360,7 @@ double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
 }
 
 std::string table_revision(const SurfaceDescription& description) {
-  std::string revision = std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
+  std::string revision = "grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
   for (const Layer& layer : description.heights) {
     if (!is_scanned(layer)) continue;
     revision += layer.adds ? "\n+" : "\n=";

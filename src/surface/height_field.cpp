@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 
+#include "surface/rtin.h"
 #include "surface/tile_content.h"
 #include "surface/tile_grid.h"
+#include "surface/tile_samples.h"
 
 namespace tellurion::surface {
 namespace {
@@ -51,7 +54,40 @@ Result<HeightField> field_of_finest_data(ElevationModel& model, const geo::TileK
       field.heights.push_back(heights[static_cast<std::size_t>((2 * row + 1) * kFineSide + 2 * column + 1)]);
     }
   }
+  constexpr int kHalfSteps = 2 * kGridSide - 1;
+  field.fine.reserve(static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
+  for (int row = 1; row <= kHalfSteps; ++row) {
+    const double* first = heights.data() + row * kFineSide + 1;
+    field.fine.insert(field.fine.end(), first, first + kHalfSteps);
+  }
   return field;
+}
+
+Result<double> measured_error(ElevationModel& model, const geo::TileKey& key, std::span<const double> drawn,
+                              std::span<const double> fine) {
+  constexpr int kHalfSteps = 2 * kGridSide - 1;
+  constexpr double kBetweenPlaces = 1.1;
+  assert(drawn.size() == static_cast<std::size_t>(kGridSide) * kGridSide && fine.size() == static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
+  double largest = 0.0;
+  for (int y = 0; y < kHalfSteps; ++y) {
+    for (int x = 0; x < kHalfSteps; ++x) {
+      const double shown = interpolate_in_triangles(drawn, kGridSide, x / 2.0, y / 2.0);
+      largest = std::max(largest, std::abs(fine[static_cast<std::size_t>(y * kHalfSteps + x)] - shown));
+    }
+  }
+  for (std::size_t i = 0; i < model.layer_count(); ++i) {
+    if (!model.layer(i).source->coverage().touches(key)) continue;
+    const std::vector<TileSample> samples = samples_under(model.raster(i).reader(), model.raster(i).description(), key);
+    std::vector<geo::LatLon> places(samples.size());
+    std::transform(samples.begin(), samples.end(), places.begin(), [](const TileSample& s) { return s.place; });
+    std::vector<double> metres(samples.size());
+    if (Result<void> read = model.heights(places, 0.0, metres); !read) return read.error();
+    for (std::size_t n = 0; n < samples.size(); ++n) {
+      const glm::dvec2 grid = samples[n].st * static_cast<double>(kCells);
+      largest = std::max(largest, std::abs(metres[n] - interpolate_in_triangles(drawn, kGridSide, grid.x, grid.y)));
+    }
+  }
+  return kBetweenPlaces * largest;
 }
 
 // Let f be the surface, g = f - (its interpolation over a triangle T of the grid), in units of the grid's step, so that T's

@@ -13,7 +13,8 @@ namespace tellurion::surface {
 struct HeightField {
   std::vector<geo::Vector<geo::Ecef>> normals;
   std::vector<double> heights;
-  double error = 0.0;  ///< bound of |finest data - full triangulation|, metres
+  double error = 0.0;         ///< bound of |finest data - full triangulation|, metres
+  std::vector<double> fine;   ///< finest heights at half steps, (2 * kGridSide - 1)^2, if the error was told from them
 };
 
 /// The grid of a tile that is coarser than its data, from samples about as far apart as its points.
@@ -21,6 +22,12 @@ Result<HeightField> field_of_known_error(ElevationModel& model, const geo::TileK
 
 /// The grid of a tile that is at least as fine as its data, from the finest there are; its error is told from them.
 Result<HeightField> field_of_finest_data(ElevationModel& model, const geo::TileKey& key);
+
+/// Largest deviation of drawn heights (kGridSide^2, linear over the full triangulation) from the finest data under a tile, found at
+/// half the grid's steps (`fine`) and at all samples of the data within the tile, and a tenth more for the places between:
+/// over random places the largest excess found was 0.03 for etopo5, SRTM and LOLA data, and 0.06 for white noise.
+Result<double> measured_error(ElevationModel& model, const geo::TileKey& key, std::span<const double> drawn,
+                              std::span<const double> fine);
 
 /// Bound of |surface - full triangulation of the tile's grid|, for a grid that is at least as fine as the samples that the
 /// surface is bilinear between. `heights` are samples of the surface at half the grid's spacing, one such step beyond

@@ -208,6 +208,24 @@ GridTriangles extract_triangles(std::span<const float> errors, int side, float t
   return Extractor(errors, side, tolerance).run();
 }
 
+std::vector<double> drawn_heights(const GridTriangles& triangles, std::span<const double> heights, int side) {
+  const auto point = [&](std::size_t corner) {
+    const int p = static_cast<int>(triangles.points[triangles.indices[corner]]);
+    return GridPoint{p % side, p / side};
+  };
+  std::vector<double> drawn(heights.size());
+  for (std::size_t i = 0; i < triangles.indices.size(); i += 3) {
+    const Triangle t{point(i), point(i + 1), point(i + 2)};
+    const Plane plane = plane_through(heights, side, t);
+    for_each_row(t, [&](int y, int first, int last) {
+      for (int x = first; x <= last; ++x) drawn[index_of(x, y, side)] = plane.at(x, y);
+    });
+  }
+  // Corners exactly, not by their plane.
+  for (const std::uint32_t p : triangles.points) drawn[p] = heights[p];
+  return drawn;
+}
+
 double largest_deviation(const GridTriangles& triangles, std::span<const double> heights, int side) {
   const auto point = [&](std::size_t corner) {
     const int p = static_cast<int>(triangles.points[triangles.indices[corner]]);

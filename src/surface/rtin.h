@@ -61,6 +61,9 @@ GridTriangles extract_triangles(std::span<const float> errors, int side, float t
 /// Raises errors so that they grow towards the root; needed after changing single ones.
 void saturate_errors(std::span<float> errors, int side);
 
+/// The heights that triangles with corners at `heights` show at every grid point.
+std::vector<double> drawn_heights(const GridTriangles& triangles, std::span<const double> heights, int side);
+
 /// Largest distance between `heights` and the triangles at all grid points.
 double largest_deviation(const GridTriangles& triangles, std::span<const double> heights, int side);
 

@@ -54,7 +54,7 @@ double error_of_ancestors(const SurfaceFacts& facts, geo::TileKey key) {
 }  // namespace
 
 Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key,
-                                    const MeshSettings& settings, std::stop_token stop) {
+                                    double parent_error, const MeshSettings& settings, std::stop_token stop) {
   const TileFacts known = facts.facts_of(key);
   Result<HeightField> field =
       known.height_error ? field_of_known_error(model, key, static_cast<double>(*known.height_error)) : field_of_finest_data(model, key);
@@ -71,12 +71,19 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
 
   const geo::Ellipsoid& ellipsoid = model.description().ellipsoid;
   const double least = settings.of_tile_size * nominal_tile_size(ellipsoid, key.level);
-  const MeshTolerance tolerance{std::max(settings.of_grid_error * field->error, least), least};
+  const double of_parent = std::min(settings.of_parent_error * parent_error - field->error, 4.0 * least);
+  const MeshTolerance tolerance{std::max({settings.of_grid_error * field->error, of_parent, least}), least};
   DecimatedMesh decimated = make_tile_mesh(ellipsoid, key, field->normals, field->heights, parents, tolerance);
 
   TileGeometry geometry;
   geometry.mesh = std::move(decimated.mesh);
-  geometry.metrics.height_error = static_cast<float>(field->error + decimated.height_deviation);
+  double error = field->error + decimated.height_deviation;
+  if (!known.height_error) {
+    const Result<double> measured = measured_error(model, key, decimated.drawn, field->fine);
+    if (!measured) return measured.error();
+    error = std::min(error, *measured + decimated.sideways_deviation);
+  }
+  geometry.metrics.height_error = static_cast<float>(error);
   geometry.metrics.curvature_error = static_cast<float>(decimated.curvature_deviation);
   const auto [lowest, highest] = std::minmax_element(field->heights.begin(), field->heights.end());
   // The drawn heights, and the true ones: as the facts have them or within the error of those drawn.

@@ -15,7 +15,7 @@
 
 namespace tellurion::surface {
 
-inline constexpr int kGridSide = 65;           ///< height samples along a tile's side
+inline constexpr int kGridSide = 129;          ///< height samples along a tile's side
 inline constexpr int kColourSlotSide = 256;    ///< texels of a colour slot along a side, gutters included
 inline constexpr int kColourGutter = 4;        ///< texels of it beyond each border of the tile
 inline constexpr int kSlopeSlotSide = 128;

@@ -139,7 +139,6 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
 
   // A flat triangle also shifts its inside sideways against the grid's equi-angular coordinates: by less than
   // diameter^2 / (8 radius), measured over all triangles of a face (0.94 of it at worst), the same as its sag.
-  double shifted = 0.0;
   for (std::size_t i = 0; i < triangles.indices.size(); i += 3) {
     std::array<glm::dvec3, 3> corner;
     std::array<double, 3> height{};
@@ -150,9 +149,13 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
     }
     const double sag_here = sag(squared_diameter(corner[0], corner[1], corner[2]), tightest_radius);
     out.curvature_deviation = std::max(out.curvature_deviation, sag_here);
-    shifted = std::max(shifted, sag_here * slope_of(corner, height));
+    out.sideways_deviation = std::max(out.sideways_deviation, sag_here * slope_of(corner, height));
   }
-  out.height_deviation = largest_deviation(triangles, heights, kGridSide) + shifted;
+  out.drawn = drawn_heights(triangles, heights, kGridSide);
+  for (std::size_t i = 0; i < kPointCount; ++i) {
+    out.height_deviation = std::max(out.height_deviation, std::abs(out.drawn[i] - heights[i]));
+  }
+  out.height_deviation += out.sideways_deviation;
   return out;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "geo/ellipsoid.h"
 #include "geo/frames.h"
@@ -19,8 +20,11 @@ struct MeshTolerance {
 /// A mesh and how far it is from the full grid, measured after building.
 struct DecimatedMesh {
   TileMesh mesh;
-  double height_deviation = 0;     ///< metres at exaggeration 1
-  double curvature_deviation = 0;  ///< metres
+  std::vector<double> drawn;        ///< heights that the triangles show at the grid's points; between them they are linear over
+                                    ///< the full triangulation (see interpolate_in_triangles)
+  double height_deviation = 0;      ///< of heights, metres at exaggeration 1; sideways_deviation included
+  double sideways_deviation = 0;    ///< the part of it that comes from flat triangles shifting what they show sideways
+  double curvature_deviation = 0;   ///< metres
 };
 
 /// `normals` and `heights` are the tile's kGridSide^2 points row by row, `parent_heights` what the parent level shows there.

@@ -38,6 +38,7 @@ struct TileRequest {
   geo::TileKey key;
   Part part = Part::geometry;
   double gain_px = 0;             ///< screen error that it takes away; requests are sorted by it, greatest first
+  double parent_error = 0;        ///< of the parent's heights, metres: a tile need not be better than a share of that
 };
 
 struct SelectionStats {

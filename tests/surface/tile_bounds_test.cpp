@@ -97,7 +97,7 @@ TEST_CASE("tile_shape: sizes agree with arc lengths on a sphere") {
     const std::uint32_t middle = 1u << (level - 1);
     const TileShape square = tile_shape(geo::kMoon, {2, static_cast<std::uint8_t>(level), middle, middle});
     CHECK(square.size == doctest::Approx(r * angle).epsilon(1e-3));
-    CHECK(square.grid_diagonal == doctest::Approx(r * angle * std::sqrt(2.0) / 64).epsilon(1e-3));
+    CHECK(square.grid_diagonal == doctest::Approx(r * angle * std::sqrt(2.0) / (kGridSide - 1)).epsilon(1e-3));
     CHECK(square.cone == doctest::Approx(angle / std::sqrt(2.0)).epsilon(1e-3));
     const TileShape corner = tile_shape(geo::kMoon, {2, static_cast<std::uint8_t>(level), 0, 0});
     CHECK(corner.size == doctest::Approx(r * angle * std::sqrt(4.0 / 3)).epsilon(0.03));

@@ -89,7 +89,7 @@ TEST_CASE("make_tile_mesh: vertices lie within 1e-7 of the tile's size, and 1 mm
       const double allowed = size <= 10e3 ? std::min(1e-3, 1e-7 * size) : 1e-7 * size;
       double worst = 0;
       for (const TileVertex& v : built.mesh.vertices) {
-        const auto point = static_cast<std::size_t>(std::lround(v.st.y * 64) * kGridSide + std::lround(v.st.x * 64));
+        const auto point = static_cast<std::size_t>(std::lround(v.st.y * (kGridSide - 1)) * kGridSide + std::lround(v.st.x * (kGridSide - 1)));
         // Exact: the formula over doubles, itself held against GeographicLib where degrees are fine enough to say.
         const glm::dvec3 exact = geo::surface_point(geo::kWgs84, normals[point]).xyz + heights[point] * normals[point].xyz;
         worst = std::max(worst, glm::distance(shown(built.mesh, v), exact));
@@ -172,14 +172,14 @@ TEST_CASE("make_tile_mesh: the deviations it reports are those of the drawn tria
       const geo::Geodetic seen = geo::to_geodetic(geo::kWgs84, {point});
       const auto uv = geo::project_to_face(key.face, geo::normal_at(geo::place_of(seen)));
       const geo::FaceRect rect = geo::face_rect(key);
-      const glm::dvec2 at = glm::clamp((*uv - rect.lower) / (rect.upper - rect.lower), 0.0, 1.0) * 64.0;
+      const glm::dvec2 at = glm::clamp((*uv - rect.lower) / (rect.upper - rect.lower), 0.0, 1.0) * (kGridSide - 1.0);
       largest = std::max(largest, std::abs(seen.height.value - interpolate_in_triangles(heights, kGridSide, at.x, at.y)));
       largest_without_heights = std::max(largest_without_heights, -geo::to_geodetic(geo::kWgs84, {bare}).height.value);
     }
     CHECK(largest_without_heights <= built.curvature_deviation * 1.0001 + 1e-7);
     CHECK(largest_without_heights > 0.5 * built.curvature_deviation - 1e-7);
     CHECK(largest <= built.height_deviation + built.curvature_deviation * 1.01 + 1e-6);
-    if (level <= 5) CHECK(built.curvature_deviation <= 1.5 * std::max(tolerance.curvature, size * size / 64 / 64 / 4 / 6.3e6));
+    if (level <= 5) CHECK(built.curvature_deviation <= 1.5 * std::max(tolerance.curvature, size * size / (kGridSide - 1) / (kGridSide - 1) / 4 / 6.3e6));
     CHECK(built.height_deviation <= tolerance.height + 0.05 * built.curvature_deviation + 1e-9);
   }
 }
@@ -201,7 +201,7 @@ TEST_CASE("error_between_samples: bounds the deviation of grids finer than their
     key.y = static_cast<std::uint32_t>((1u << level) / 4 + key.y / 2);
     CAPTURE(geo::to_string(key));
     const HeightField field = std::move(field_of_finest_data(*world.model, key)).value();
-    constexpr int kDense = 257;
+    constexpr int kDense = 4 * (kGridSide - 1) + 1;
     const auto normals = grid_normals(key, kDense);
     std::vector<double> truth(normals.size());
     REQUIRE(world.model->heights(normals, 0.0, truth));
@@ -233,7 +233,7 @@ TEST_CASE("build_geometry: tells the truth about its heights, in levels above an
     key.face %= 4;
     key.y = static_cast<std::uint32_t>((1u << level) / 4 + key.y / 2);
     CAPTURE(geo::to_string(key));
-    const TileGeometry built = std::move(build_geometry(*world.model, facts, key)).value();
+    const TileGeometry built = std::move(build_geometry(*world.model, facts, key, 0.0)).value();
     double largest = 0, lowest = 1e9, highest = -1e9;
     std::uniform_real_distribution<double> share(0, 1);
     for (int i = 0; i < 20000; ++i) {
@@ -264,11 +264,12 @@ TEST_CASE("build_geometry: a child's parent heights are what its parent shows, a
   facts.error = 500.0f;
   const geo::TileKey parent{1, 5, 9, 17};
   const HeightField field = std::move(field_of_known_error(*world.model, parent, 500)).value();
+  constexpr double kHalf = (kGridSide - 1) / 2.0;
   for (int i = 0; i < 4; ++i) {
-    const TileMesh mesh = std::move(build_geometry(*world.model, facts, geo::child(parent, i), {0.01, 1e-6})).value().mesh;
+    const TileMesh mesh = std::move(build_geometry(*world.model, facts, geo::child(parent, i), 0.0, {0.01, 0.0, 1e-6})).value().mesh;
     REQUIRE(mesh.vertices.size() > 2000);
     for (const TileVertex& v : mesh.vertices) {
-      const double x = static_cast<double>(v.st.x) * 32 + (i & 1) * 32, y = static_cast<double>(v.st.y) * 32 + (i >> 1) * 32;
+      const double x = (static_cast<double>(v.st.x) + (i & 1)) * kHalf, y = (static_cast<double>(v.st.y) + (i >> 1)) * kHalf;
       const double expected = interpolate_in_triangles(field.heights, kGridSide, x, y);
       REQUIRE(static_cast<double>(v.parent_height) + mesh.reference_height == doctest::Approx(expected).epsilon(1e-5));
     }
@@ -305,7 +306,7 @@ TEST_CASE("build_geometry: gives up when asked to") {
   MadeWorld world({});
   std::stop_source stop;
   stop.request_stop();
-  const auto built = build_geometry(*world.model, FlatFacts(), {0, 3, 1, 1}, {}, stop.get_token());
+  const auto built = build_geometry(*world.model, FlatFacts(), {0, 3, 1, 1}, 0.0, {}, stop.get_token());
   REQUIRE(!built);
   CHECK(built.error().code == ErrorCode::cancelled);
 }
