@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # label: slow
-# timeout: 900
+# timeout: 1800
 """The window, driven by real mouse and key events on a display in memory (Xvfb).
 
 What the camera does is read from --camera-log and held against the mathematics of _common.py; what is drawn is read back
@@ -66,11 +66,25 @@ class Viewer:
                    "--trace", self.trace, "--camera-log", self.log, *options]
         self.process = subprocess.Popen(list(map(str, command)), cwd=folder, stderr=subprocess.PIPE, text=True,
                                         env=os.environ | {"XDG_CACHE_HOME": str(folder / "cache")})
-        found = subprocess.run(["xdotool", "search", "--sync", "--onlyvisible", "--pid", str(self.process.pid), "--name", "Tellurion"],
-                               capture_output=True, text=True, timeout=120)
-        self.window = int(found.stdout.split()[0])
+        self.window = self.wait_for_window()
         self.do("windowfocus", self.window)
         self.settle()
+
+    def wait_for_window(self, timeout=120):
+        search = ["xdotool", "search", "--onlyvisible", "--pid", str(self.process.pid), "--name", "Tellurion"]
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            self.assert_runs()
+            found = subprocess.run(search, capture_output=True, text=True, timeout=60).stdout.split()
+            if found:
+                return int(found[0])
+            time.sleep(0.1)
+        self.process.kill()
+        raise AssertionError(f"no window after {timeout} s")
+
+    def assert_runs(self):
+        if self.process.poll() is not None:
+            raise AssertionError(f"ended with status {self.process.returncode}: {self.process.stderr.read()}")
 
     def do(self, *words):
         """Runs words of xdotool."""
@@ -112,8 +126,7 @@ class Viewer:
         end = time.monotonic() + timeout
         count, since = self.frames_before, time.monotonic()
         while time.monotonic() < end:
-            if self.process.poll() is not None:
-                raise AssertionError(f"ended with status {self.process.returncode}: {self.process.stderr.read()}")
+            self.assert_runs()
             now = self.frames()
             if now != count:
                 count, since = now, time.monotonic()
