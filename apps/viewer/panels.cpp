@@ -100,7 +100,8 @@ std::string status_text(const globe::FrameStats& stats, const Moment& moment) {
                   heading, to_degrees(moment.pose.pitch).value + 90.0);
   if (moment.metres_per_pixel > 0.0)
     text += fmt::format("   |   100 px = {}", text_of_metres(100.0 * moment.metres_per_pixel));
-  if (!stats.complete) text += fmt::format("   |   loading {}", stats.tiles_waiting);
+  if (!stats.complete)
+    text += stats.tiles_waiting > 0 ? fmt::format("   |   loading {}", stats.tiles_waiting) : "   |   preparing data";
   return text;
 }
 
