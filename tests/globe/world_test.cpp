@@ -1,0 +1,116 @@
+#include "globe/world.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <doctest/doctest.h>
+
+using namespace tellurion;
+using namespace tellurion::globe;
+
+namespace {
+
+constexpr const char* kWhole = R"(
+[planet]
+name = "Mars"
+
+[[layer]]
+name = "MOLA"
+group = "height"
+mode = "add"
+source = { type = "gdal", path = "mola.tif", vertical = "ellipsoid", scale = 0.5, offset = -3.0, no_data = -9999 }
+
+[[layer]]
+group = "color"
+source = { path = "../viking.tif", bands = [3, 2, 1], crs = "IAU_2015:49900" }
+opacity = 0.5
+gamma = 2
+multiplier = 1.5
+enabled = false
+)";
+
+std::string message_of(const char* text) {
+  const auto world = parse_world(text, "/worlds", "w.toml");
+  REQUIRE_FALSE(world);
+  return world.error().message;
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("parse_world: reads every key") {
+  const auto world = parse_world(kWhole, "/worlds/mars", "w.toml");
+  REQUIRE(world);
+  CHECK(world->planet == "Mars");
+  CHECK(world->ellipsoid == geo::kMars);
+  REQUIRE(world->layers.size() == 2);
+  const LayerSpec& height = world->layers[0];
+  CHECK(height.group == LayerGroup::height);
+  CHECK(height.adds);
+  CHECK(height.source.path == "/worlds/mars/mola.tif");
+  CHECK(height.source.vertical == "ellipsoid");
+  CHECK(height.source.scale == 0.5);
+  CHECK(height.source.offset == -3.0);
+  CHECK(height.source.no_data == -9999.0);
+  const LayerSpec& colour = world->layers[1];
+  CHECK(colour.name == "viking");
+  CHECK(colour.source.path == "/worlds/viking.tif");
+  CHECK(*colour.source.bands == std::array{3, 2, 1});
+  CHECK(colour.source.crs == "IAU_2015:49900");
+  CHECK(colour.opacity == 0.5);
+  CHECK(colour.gamma == 2.0);
+  CHECK(colour.multiplier == 1.5);
+  CHECK_FALSE(colour.enabled);
+}
+
+TEST_CASE("to_toml: parse_world gives the same world back") {
+  auto world = parse_world(kWhole, "/worlds/mars", "w.toml");
+  REQUIRE(world);
+  world->file = "/worlds/mars/w.toml";
+  const std::string text = to_toml(*world);
+  const auto again = parse_world(text, "/worlds/mars", "again.toml");
+  REQUIRE(again);
+  auto placed = *again;
+  placed.file = world->file;
+  CHECK(to_toml(placed) == text);
+  CHECK(again->layers[1].source.path == world->layers[1].source.path);
+  CHECK(contains(text, "mola.tif"));
+  CHECK_FALSE(contains(text, "/worlds/mars/mola.tif"));
+}
+
+TEST_CASE("parse_world: mistakes name the file and the line") {
+  CHECK(contains(message_of("[planet]\nname = \"Vulcan\"\n"), "w.toml:2: no body is known as \"Vulcan\""));
+  CHECK(contains(message_of("[planet]\nradius = 3\n"), "w.toml:2: [planet] has no key `radius`"));
+  CHECK(contains(message_of("[planet]\nradii = [1, 2]\n"), "w.toml:2: `radii`"));
+  CHECK(contains(message_of("\n\n[[layer]]\ngroup = \"heights\"\n"), "w.toml:4: no group is called \"heights\""));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\n"), "w.toml:1: the layer has no `source`"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = 2\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
+  CHECK(contains(message_of("[layer]\ngroup = \"color\"\n"), "two brackets"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \n"), "w.toml:2: not valid TOML"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"xyz\", url = \"u\" }\n"), "\"xyz\""));
+}
+
+TEST_CASE("load_world: a file that is not there is named") {
+  const auto world = load_world("/no/such/world.toml");
+  REQUIRE_FALSE(world);
+  CHECK(world.error().code == ErrorCode::not_found);
+  CHECK(contains(world.error().message, "/no/such/world.toml"));
+}
+
+TEST_CASE("save_world: what is saved is loaded again") {
+  const auto folder = std::filesystem::temp_directory_path() / "tellurion_world_test";
+  std::filesystem::create_directories(folder);
+  auto world = parse_world(kWhole, folder, "w.toml");
+  REQUIRE(world);
+  REQUIRE(save_world(*world, folder / "saved.toml"));
+  const auto again = load_world(folder / "saved.toml");
+  REQUIRE(again);
+  CHECK(again->layers[0].source.path == world->layers[0].source.path);
+  CHECK(again->planet == "Mars");
+  const auto nowhere = save_world(*world, folder / "no" / "folder" / "w.toml");
+  REQUIRE_FALSE(nowhere);
+  CHECK(contains(nowhere.error().message, "w.toml"));
+  std::filesystem::remove_all(folder);
+}
