@@ -21,7 +21,7 @@ float depth_to_space(vec3 p, vec3 d) {
 
 // Share of the sun's light that reaches `p`.
 vec3 sunlight_at(vec3 p) {
-  return exp(-(air_scatter.rgb + air_scatter.w) * depth_to_space(p, air_sun.xyz));
+  return exp(-air_extinction.rgb * depth_to_space(p, air_sun.xyz));
 }
 
 // Where the ray from the eye enters (x) and leaves (y) the atmosphere's top; y < x if it misses.
@@ -37,7 +37,6 @@ vec2 within_atmosphere(vec3 direction) {
 // Light that the air between two distances along a ray from the eye sends to it, tone-mapped and linear, and the share
 // of light that passes. `bias`: how strongly the samples gather at the near (> 0) or the far end (< 0), in [-1, 1].
 void scatter(vec3 direction, float from, float to, float bias, int samples, out vec3 light, out vec3 through) {
-  vec3 extinction = air_scatter.rgb + air_scatter.w;
   vec3 depth = vec3(0.0);
   light = vec3(0.0);
   float count = float(samples);
@@ -47,7 +46,7 @@ void scatter(vec3 direction, float from, float to, float bias, int samples, out 
     float width = (1.0 + bias * (2.0 * t - 1.0)) / count * (to - from);
     vec3 p = air_eye.xyz + direction * (from + s * (to - from));
     float air = exp(min((1.0 - length(p)) / air_scale.w, 0.0)) * width;
-    vec3 here = extinction * air;
+    vec3 here = air_extinction.rgb * air;
     light += exp(-(depth + 0.5 * here)) * sunlight_at(p) * air;
     depth += here;
   }

@@ -6,6 +6,7 @@ layout(std140) uniform Frame {
   vec4 air_eye;             // xyz: the eye in the atmosphere's space
   vec4 air_scale;           // xyz: metres in Ecef axes -> the atmosphere's space; w: scale height there
   vec4 air_scatter;         // rgb: scattering by molecules per unit of length at the ground; w: by haze
+  vec4 air_extinction;      // rgb: loss of light per unit of length at the ground
   vec4 sky_east;            // xyz: directions at the eye in the atmosphere's space; w: lowest angle of the sky mesh
   vec4 sky_north;           // w: highest angle
   vec4 sky_up;              // w: radius of the atmosphere's top

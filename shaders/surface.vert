@@ -74,7 +74,7 @@ void main() {
   v_ambient = vec3(mix(0.025, 0.25, sky));
 #ifdef ATMOSPHERE
   // Relative to a high sun, under which pictures of the ground were taken.
-  vec3 colour = sunlight_at(place) * exp((air_scatter.rgb + air_scatter.w) * air_scale.w);
+  vec3 colour = sunlight_at(place) * exp(air_extinction.rgb * air_scale.w);
   v_sunlight *= min(colour, vec3(1.0));
   v_ambient *= mix(vec3(0.85, 0.95, 1.2), vec3(1.0), sky);
 #endif

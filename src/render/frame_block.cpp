@@ -33,7 +33,7 @@ glm::dmat4 projection(const view::Camera& camera, bool reversed) {
 /// Pictures from space are exposed for the bright disc, those from the ground for the sky: share of the air's brightness.
 double exposure(double height_m) {
   const double t = std::clamp((height_m - 2e3) / 80e3, 0.0, 1.0);
-  return 1.0 - 0.5 * t * t * (3.0 - 2.0 * t);
+  return 1.0 - 0.6 * t * t * (3.0 - 2.0 * t);
 }
 
 /// Angle of the rays from `distance` that touch a sphere of `radius`, above the horizontal.
@@ -57,6 +57,7 @@ void add_air(FrameBlock& block, const view::Camera& camera, const FrameLook& loo
   block.air_eye = glm::vec4(eye, 0.0);
   block.air_scale = glm::vec4(scale, air.scale_height_m / ellipsoid.a());
   block.air_scatter = glm::vec4(air.scattering_per_m * ellipsoid.a(), air.haze_per_m * ellipsoid.a());
+  block.air_extinction = glm::vec4((air.scattering_per_m + air.haze_per_m + air.absorption_per_m) * ellipsoid.a(), 0.0);
   block.sky_east = glm::vec4(east, lowest);
   block.sky_north = glm::vec4(glm::cross(up, east), highest);
   block.sky_up = glm::vec4(up, top);

@@ -17,6 +17,7 @@ struct FrameBlock {
   glm::vec4 air_eye;
   glm::vec4 air_scale;
   glm::vec4 air_scatter;
+  glm::vec4 air_extinction;
   glm::vec4 sky_east;
   glm::vec4 sky_north;
   glm::vec4 sky_up;

@@ -27,6 +27,7 @@ struct Air {
   double scale_height_m = 8000.0;
   glm::dvec3 scattering_per_m{5.8e-6, 13.5e-6, 33.1e-6};  ///< by molecules at height 0: red, green, blue
   double haze_per_m = 2.0e-6;                             ///< grey scattering, mostly forwards
+  glm::dvec3 absorption_per_m{1.2e-6, 3.5e-6, 0.2e-6};    ///< by ozone, its column spread over the scale height
   double top_m = 100e3;                                   ///< nothing is drawn above
   double brightness = 15.0;                               ///< of the scattered light, 1 leaving a pixel at 1 - 1/e
 };

@@ -30,7 +30,7 @@ constexpr int kRun = 16;  ///< samples of a row that are left out together
 /// The surface between samples is compared where those round it are off by this share of the worst so far, up to a quarter of
 /// a sample apart; between such places the deviation can be a little larger.
 constexpr double kWorthALook = 0.4;
-constexpr double kBetweenPlaces = 1.05;
+constexpr double kBetweenPlaces = 1.15;
 
 constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), 0.0f};
 
@@ -180,18 +180,18 @@ class Scanner {
       if (Result<void> scanned = scan_raster(model_.raster(i), is_finest); !scanned) return scanned;
       some_raster_ends = some_raster_ends || !source.description().wraps;
     }
-    return compare_parts_of_steps(some_raster_ends);
+    return compare_half_steps(some_raster_ends);
   }
 
-  Result<void> compare_parts_of_steps(bool inside_too) {
-    const int last = (inside_too ? 4 : 2) * (kGridSide - 1);  // where a raster ends, cells are cut: quarters of a step there
+  Result<void> compare_half_steps(bool inside_too) {
+    constexpr int kLast = 2 * (kGridSide - 1);
     const OnPath& leaf = path_.back();
     std::vector<glm::dvec2> uv;
     std::vector<geo::Vector<geo::Ecef>> normals;
-    for (int y = 0; y <= last; ++y) {
-      const bool whole_row = inside_too || y == 0 || y == last;
-      for (int x = 0; x <= last; x += whole_row ? 1 : last) {
-        uv.push_back(leaf.rect.lower + (leaf.rect.upper - leaf.rect.lower) * (glm::dvec2(x, y) / static_cast<double>(last)));
+    for (int y = 0; y <= kLast; ++y) {
+      const bool whole_row = inside_too || y == 0 || y == kLast;
+      for (int x = 0; x <= kLast; x += whole_row ? 1 : kLast) {
+        uv.push_back(leaf.rect.lower + (leaf.rect.upper - leaf.rect.lower) * (glm::dvec2(x, y) / static_cast<double>(kLast)));
         normals.push_back(geo::face_normal(leaf.key.face, uv.back()));
       }
     }

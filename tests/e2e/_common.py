@@ -212,10 +212,10 @@ def grown(mask, by):
 class GeographicRaster:
     """A raster in longitude and latitude, looked up as GDAL does: samples at pixel centres, bilinear between."""
 
-    def __init__(self, path):
+    def __init__(self, path, band=1):
         data = gdal.Open(str(path))
-        self.values = data.ReadAsArray().astype(float)
-        no_data = data.GetRasterBand(1).GetNoDataValue()
+        self.values = data.GetRasterBand(band).ReadAsArray().astype(float)
+        no_data = data.GetRasterBand(band).GetNoDataValue()
         if no_data is not None:
             self.values[self.values == no_data] = np.nan
         self.west, self.dlon, _, self.north, _, self.dlat = data.GetGeoTransform()
@@ -253,14 +253,13 @@ class GeographicRaster:
         return np.sum(samples * weights, axis=0)
 
     def absent(self, lat, lon):
-        """Whether the raster has nothing to say: outside by two samples, or all four samples in a void."""
-        samples, _, beyond = self._corners(lat, lon)
-        return np.all(np.isnan(samples), axis=0) & ((beyond > 2.0) | (beyond <= 0.0))
+        """Whether the raster has nothing to say there: outside by more than two samples."""
+        return self._corners(lat, lon)[2] > 2.0
 
 
 def elevation(rasters, lat, lon):
-    """Height of rasters laid over one another, the last on top: bilinear, 0 where none has data. NaN, which means that there
-    is no telling, where the topmost raster lacks some of the four samples but not all, or ends within two samples."""
+    """Height of rasters laid over one another, the last on top: bilinear, 0 outside of all. NaN, which means that there is no
+    telling, where the topmost raster has a void among the four samples or ends within two samples."""
     result = np.zeros_like(np.asarray(lat, float))
     for raster in rasters:
         result = np.where(raster.absent(lat, lon), result, raster.bilinear(lat, lon))

@@ -1,4 +1,5 @@
 """The same picture, byte for byte, whatever the workers, the caches and the day: a few runs; determinism_all.py has more."""
+# label: slow
 # timeout: 600
 import itertools
 import unittest

@@ -1,4 +1,5 @@
 """Every pixel of --geo lies on the elevation: a few views at a small size; geometry_true_all.py has the rest."""
+# label: slow
 # timeout: 600
 import unittest
 

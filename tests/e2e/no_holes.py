@@ -1,4 +1,5 @@
 """No pixel shows the background through the surface, finished or loading: a few views; no_holes_all.py has the rest."""
+# label: slow
 # timeout: 900
 import random
 import unittest

@@ -1,4 +1,5 @@
 """A pole costs what the equator costs: a few poses; poles_all.py has all of them."""
+# label: slow
 # timeout: 600
 import json
 import statistics

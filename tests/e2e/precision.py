@@ -1,4 +1,5 @@
 """The bare ellipsoid in --geo against the intersection of rays with it; and a camera that creeps a millimetre a frame."""
+# label: slow
 # timeout: 600
 import unittest
 

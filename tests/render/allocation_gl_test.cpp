@@ -63,7 +63,7 @@ TEST_CASE("draw: allocates nothing in steady state, whatever the look") {
     for (int i = 0; i < 3; ++i) frame(i);
     for (int i = 3; i < 8; ++i) CHECK(frame(i) == 0);
     CHECK(figures.draws >= static_cast<int>(tiles.size()));
-    CHECK(figures.triangles == static_cast<std::int64_t>(tiles.size()) * 64 * 64 * 2);
+    CHECK(figures.triangles == static_cast<std::int64_t>(tiles.size()) * kCells * kCells * 2);
   }
   const std::size_t before = allocations;
   CHECK(std::make_unique<int>(1) != nullptr);

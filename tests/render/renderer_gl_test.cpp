@@ -283,7 +283,7 @@ TEST_CASE("upload: what does not fit the budget is refused, and fits after a rel
 
   std::size_t meshes = 0;
   while (meshes < keys.size() && stage.renderer->upload_geometry(*stage.thread, keys[meshes], geometry)) ++meshes;
-  CHECK(meshes > 5);  // colours leave room for geometry
+  CHECK(meshes > 2);  // colours leave room for geometry
   CHECK(meshes < keys.size());
   CHECK(stage.renderer->gpu_bytes() <= kBudget);
   const std::size_t full = stage.renderer->gpu_bytes();

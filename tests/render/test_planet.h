@@ -20,10 +20,11 @@ namespace tellurion::render::test {
 using HeightFunction = std::function<double(const geo::Vector<geo::Ecef>& normal)>;
 using ColourFunction = std::function<glm::dvec3(const geo::Vector<geo::Ecef>& normal)>;  // encoded, [0, 1]
 
+inline constexpr int kCells = 64;  ///< of a test tile's grid, along a side
+
 /// The tile's grid of 65 x 65 points at `height`, as surface::TileVertex defines it.
 inline surface::TileGeometry exact_geometry(const geo::Ellipsoid& ellipsoid, const geo::TileKey& key,
                                             const HeightFunction& height) {
-  constexpr int kCells = surface::kGridSide - 1;
   surface::TileGeometry geometry;
   surface::TileMesh& mesh = geometry.mesh;
   mesh.origin_up = geo::tile_normal(key, {0.5, 0.5});
@@ -43,8 +44,8 @@ inline surface::TileGeometry exact_geometry(const geo::Ellipsoid& ellipsoid, con
   }
   for (int row = 0; row < kCells; ++row) {
     for (int column = 0; column < kCells; ++column) {
-      const int a = row * surface::kGridSide + column;
-      const int b = a + surface::kGridSide;
+      const int a = row * (kCells + 1) + column;
+      const int b = a + kCells + 1;
       for (const int i : {a, b, a + 1, a + 1, b, b + 1}) mesh.indices.push_back(static_cast<std::uint16_t>(i));
     }
   }
