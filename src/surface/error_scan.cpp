@@ -180,7 +180,14 @@ class Scanner {
       if (Result<void> scanned = scan_raster(model_.raster(i), is_finest); !scanned) return scanned;
       some_raster_ends = some_raster_ends || !source.description().wraps;
     }
-    return compare_half_steps(some_raster_ends);
+    if (Result<void> compared = compare_half_steps(some_raster_ends); !compared) return compared;
+    if (some_raster_ends) {
+      // Where rasters are blended, heights between the places may lie beyond those found.
+      const OnPath& leaf = path_.back();
+      const double beyond = (kBetweenPlaces - 1.0) * leaf.worst;
+      extend_range(static_cast<double>(leaf.record.min_height) - beyond, static_cast<double>(leaf.record.max_height) + beyond);
+    }
+    return {};
   }
 
   Result<void> compare_half_steps(bool inside_too) {
