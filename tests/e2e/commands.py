@@ -1,4 +1,5 @@
 """Every command of the contract, used rightly and wrongly: what it prints, writes, and ends with."""
+# label: slow
 # timeout: 900
 import json
 import math

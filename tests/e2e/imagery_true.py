@@ -1,4 +1,5 @@
 """Imagery lies where it belongs: the picture against the raster's colours at the places that --geo names."""
+# label: slow
 # timeout: 600
 import unittest
 

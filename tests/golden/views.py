@@ -1,3 +1,4 @@
+# label: slow
 # timeout: 900
 """Pictures of real places, compared with ones that somebody has looked at.
 
