@@ -125,7 +125,6 @@ endif()
 
 # --- What must not compile: tests/compile_fail/<name>.cpp compiles as it is, and not with -DMISUSE ---------------------
 
-get_target_property(glm_includes glm::glm INTERFACE_INCLUDE_DIRECTORIES)
 file(GLOB misuse_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/compile_fail/*.cpp)
 foreach(source IN LISTS misuse_sources)
   cmake_path(GET source STEM name)
