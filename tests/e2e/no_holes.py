@@ -77,8 +77,9 @@ class NoHoles(HolesCase):
 
     def test_while_a_flight_loads(self):
         flight = self.folder / "flight.csv"
-        flight.write_text("time,lat,lon,height,heading,pitch,roll\n0,46.7,-121.7,1000000,0,-70,0\n"
-                          "2,46.8,-121.76,20000,40,-60,0\n4,27.9,86.9,3000000,90,-80,0\n6,27.9,86.9,15000,180,-50,0\n")
+        # Never so high or so level that the limb comes into view.
+        flight.write_text("time,lat,lon,height,heading,pitch,roll\n0,46.7,-121.7,900000,0,-85,0\n2,46.8,-121.76,20000,0,-75,0\n"
+                          "4,40,-110,300000,0,-85,0\n6,36,-100,30000,0,-75,0\n")
         out = self.folder / "flight"
         self.tellurion("fly", self.world("world", *LAYERS), flight, "--out", out, "--realtime", "--fps", 10, *OPTIONS)
         files = sorted(out.glob("*.png"))
