@@ -22,7 +22,8 @@ SMALL = ["--size", "160x90"]
 WRONG_OPTIONS = [
     ["--no-such-option"], ["--camera", "1,2"], ["--camera", "91,0,1000"], ["--camera", "a,b,c"],
     ["--camera", "0,0,1000,0,0,0,0"], ["--size", "100"], ["--size", "0x100"], ["--size", "-1x5"], ["--vfov", "0"],
-    ["--vfov", "180"], ["--sse", "0"], ["--sse", "nan"], ["--exaggeration", "x"], ["--time", "yesterday"],
+    ["--vfov", "180"], ["--sse", "0"], ["--sse", "nan"], ["--exaggeration", "x"], ["--exaggeration", "nan"], ["--vfov", "nan"],
+    ["--time", "yesterday"],
     ["--workers", "-2"],
     ["--lod", "best"], ["--clear", "red"], ["--gpu-cache", "-5"], ["--memory-cache", "1.5e400"], ["--after", "-1"],
     ["--timeout", "x"]]
@@ -37,11 +38,11 @@ class CommandCase(Case):
         self.earth = self.world("earth", ("height", ETOPO5), ("height", RAINIER), ("color", BLUE_MARBLE))
 
     def refused(self, *arguments, naming, status=FAILED, text=None):
-        """The program fails with one line on standard error that names the culprit."""
+        """The program fails and names the culprit in the first line on standard error; if the work failed, the only one."""
         done = self.tellurion(*arguments, status=status, text=text)
         lines = done.stderr.strip().splitlines()
-        self.assertEqual(len(lines), 1, done.stderr)
         self.assertIn(str(naming), lines[0])
+        self.assertEqual(lines[1:] if status == FAILED else [], [])
         self.assertEqual(done.stdout, "")
 
 
@@ -336,7 +337,7 @@ class Bench(CommandCase):
         results = json.loads(file.read_text())
         self.assertGreater(len(results), 0)
         for result in results:
-            self.assertEqual(set(result), {"name", "value", "unit", "goal", "note"})
+            self.assertLessEqual({"name", "value", "unit", "goal", "note"}, set(result))
             self.assertIsInstance(result["value"], (int, float))
 
 
