@@ -51,7 +51,7 @@ Result<void> measure_tiles(const Setting& setting, Report& report) {
 
   const auto keys = tiles_at_rainier();
   const int passes = setting.quick ? 1 : 5;
-  const auto geometry = build_times(keys, passes, [&](const geo::TileKey& key) { return worker.build_geometry(surface, *facts, key, 0.0, {}); });
+  const auto geometry = build_times(keys, passes, [&](const geo::TileKey& key) { return worker.build_geometry(surface, *facts, key, {}); });
   if (!geometry) return geometry.error();
   const auto colour = build_times(keys, passes, [&](const geo::TileKey& key) { return worker.build_colour(surface, key, {}); });
   if (!colour) return colour.error();

@@ -20,6 +20,8 @@ using surface::Part;
 
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
+constexpr std::size_t kMostTiles = 10000;  ///< of a picture
+constexpr std::size_t kLeastBytes = 16u << 20;
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -56,13 +58,14 @@ render::FrameLook look_of(const ViewSettings& settings, const World& world, cons
   return look;
 }
 
-surface::SelectionSettings selection_of(const ViewSettings& settings, std::size_t max_tiles) {
+surface::SelectionSettings selection_of(const ViewSettings& settings, std::size_t max_bytes) {
   surface::SelectionSettings selection;
   selection.sse_px = settings.sse_px;
   selection.exaggeration = settings.exaggeration;
   selection.metric = settings.lod;
   selection.anisotropy = settings.anisotropy;
-  selection.max_tiles = max_tiles;
+  selection.max_tiles = kMostTiles;
+  selection.max_bytes = max_bytes;
   selection.transitions = settings.transitions;
   selection.frozen = settings.frozen;
   return selection;
@@ -93,14 +96,14 @@ struct GlobeView::State {
   std::stop_source stop;
   int in_flight = 0;
   int max_in_flight = 0;
-  std::size_t max_tiles = 0;
+  std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
   const surface::Selection* selection = nullptr;
   FrameStats stats;
 
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
   void ask(const surface::TileRequest& request);
-  bool submit(const geo::TileKey& key, Part part, double parent_error);
+  bool submit(const geo::TileKey& key, Part part);
   void take_over(double upload_ms);
   void take_over(Finished item);
   Result<void> upload(const Finished& item);
@@ -109,12 +112,12 @@ struct GlobeView::State {
   Result<void> load_roots();
 };
 
-bool GlobeView::State::submit(const geo::TileKey& key, Part part, double parent_error) {
-  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part, parent_error,
+bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
+  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part,
                            token = stop.get_token()](SurfaceWorker& worker) {
     Finished item{key, part, {}};
     if (part == Part::geometry) {
-      auto geometry = worker.build_geometry(surface, *facts, key, parent_error, token);
+      auto geometry = worker.build_geometry(surface, *facts, key, token);
       if (geometry) item.content = std::move(*geometry);
       else item.content = geometry.error();
     } else {
@@ -127,7 +130,7 @@ bool GlobeView::State::submit(const geo::TileKey& key, Part part, double parent_
 }
 
 void GlobeView::State::ask(const surface::TileRequest& request) {
-  if (!submit(request.key, request.part, request.parent_error)) return;
+  if (!submit(request.key, request.part)) return;
   ++in_flight;
   ++stats.requests;
   tree.started(request.key, request.part);
@@ -164,7 +167,7 @@ void GlobeView::State::take_over(Finished item) {
     if (error.code == ErrorCode::cancelled) return tree.cancelled(item.key, item.part);
     if (error.code == ErrorCode::exhausted) {
       // More is wanted than fits: want less from now on.
-      max_tiles = std::max<std::size_t>(max_tiles - max_tiles / 16, 32);
+      max_bytes = std::max(max_bytes - max_bytes / 16, kLeastBytes);
       return tree.cancelled(item.key, item.part);
     }
     const bool may_work_later = error.code == ErrorCode::unavailable;
@@ -198,7 +201,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
     tree.set_facts(facts);
   }
   const auto before_select = Clock::now();
-  selection = &tree.select(camera, selection_of(settings, max_tiles), before_select);
+  selection = &tree.select(camera, selection_of(settings, max_bytes), before_select);
   stats.select_ms = ms_since(before_select);
 
   for (const surface::TileRequest& request : selection->requests) {
@@ -230,7 +233,7 @@ Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& k
   nothing->ellipsoid = globe.ellipsoid();
   cache::BlockCache no_blocks(0);
   SurfaceWorker worker(no_blocks);
-  return worker.build_geometry(std::move(nothing), *facts, key, 0.0, {});
+  return worker.build_geometry(std::move(nothing), *facts, key, {});
 }
 
 Result<void> GlobeView::State::load_roots() {
@@ -240,7 +243,7 @@ Result<void> GlobeView::State::load_roots() {
   for (const Part part : {Part::geometry, Part::colour}) {
     for (int face = 0; face < geo::kFaceCount; ++face) {
       const geo::TileKey root{static_cast<std::uint8_t>(face), 0, 0, 0};
-      while (!submit(root, part, 0.0)) {
+      while (!submit(root, part)) {
         if (!globe.run_one()) std::this_thread::yield();
       }
       tree.started(root, part);
@@ -284,9 +287,7 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   auto renderer = render::Renderer::create(thread, options);
   if (!renderer) return renderer.error();
   state->renderer = std::move(*renderer);
-  // Tiles of a picture at most: what fits if each has an own colour slot with mips, slopes and a middling mesh.
-  constexpr std::size_t kMiddlingTile = (342u << 10) + (86u << 10) + (80u << 10);
-  state->max_tiles = std::max<std::size_t>(gpu_budget_bytes / kMiddlingTile, 48);
+  state->max_bytes = std::max(gpu_budget_bytes, kLeastBytes);
   state->max_in_flight = std::max(2 * std::max(globe.worker_count(), 1), 4);
   state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
   state->facts = globe.facts();
@@ -331,13 +332,13 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
 
 raster::Image GlobeView::picture(const view::Camera& camera, const ViewSettings& settings) {
   State& s = *state_;
-  s.selection = &s.tree.select(camera, selection_of(settings, s.max_tiles), Clock::now());
+  s.selection = &s.tree.select(camera, selection_of(settings, s.max_bytes), Clock::now());
   return s.renderer->picture(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
 }
 
 render::GeoPicture GlobeView::measure(const view::Camera& camera, const ViewSettings& settings) {
   State& s = *state_;
-  s.selection = &s.tree.select(camera, selection_of(settings, s.max_tiles), Clock::now());
+  s.selection = &s.tree.select(camera, selection_of(settings, s.max_bytes), Clock::now());
   return s.renderer->measure(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
 }
 

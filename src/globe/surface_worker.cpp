@@ -27,11 +27,10 @@ Result<surface::ElevationModel*> SurfaceWorker::elevation(std::shared_ptr<const 
 }
 
 Result<surface::TileGeometry> SurfaceWorker::build_geometry(std::shared_ptr<const surface::SurfaceDescription> surface,
-                                                            const surface::SurfaceFacts& facts, const geo::TileKey& key,
-                                               double parent_error, std::stop_token stop) {
+                                                            const surface::SurfaceFacts& facts, const geo::TileKey& key, std::stop_token stop) {
   const auto model = elevation(std::move(surface));
   if (!model) return model.error();
-  return surface::build_geometry(**model, facts, key, parent_error, {}, stop);
+  return surface::build_geometry(**model, facts, key, {}, stop);
 }
 
 Result<surface::TileImagery> SurfaceWorker::build_colour(std::shared_ptr<const surface::SurfaceDescription> surface,

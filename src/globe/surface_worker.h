@@ -21,8 +21,7 @@ class SurfaceWorker {
   explicit SurfaceWorker(cache::BlockCache& cache) : cache_(cache) {}
 
   Result<surface::TileGeometry> build_geometry(std::shared_ptr<const surface::SurfaceDescription> surface,
-                                               const surface::SurfaceFacts& facts, const geo::TileKey& key,
-                                               double parent_error, std::stop_token stop);
+                                               const surface::SurfaceFacts& facts, const geo::TileKey& key, std::stop_token stop);
   Result<surface::TileImagery> build_colour(std::shared_ptr<const surface::SurfaceDescription> surface, const geo::TileKey& key,
                                             std::stop_token stop);
   /// The readers of the height layers, for other questions.

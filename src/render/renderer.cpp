@@ -38,6 +38,7 @@ surface::TileGeometry triangle_before(const view::Camera& camera) {
     mesh.vertices.push_back(vertex);
   }
   mesh.indices = {0, 1, 2};
+  mesh.steps = {{0, 3, 3}};
   geometry.slopes.tangent = {camera.axes[0]};
   return geometry;
 }

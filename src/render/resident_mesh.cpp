@@ -47,7 +47,7 @@ ResidentMesh::ResidentMesh(const gpu::RenderThread& thread, const surface::TileM
       array_(thread),
       vertices_(thread),
       indices_(thread),
-      index_count_(static_cast<int>(mesh.indices.size())),
+      steps_(mesh.steps),
       origin_base_(mesh.origin_base.xyz),
       origin_up_(mesh.origin_up.xyz),
       reference_height_(mesh.reference_height) {
@@ -96,33 +96,36 @@ ResidentMesh::Box ResidentMesh::box(double exaggeration) const {
           {(upper_.x - lower_.x) * axes_[0], (upper_.y - lower_.y) * axes_[1], (top - bottom) * origin_up_}};
 }
 
-void ResidentMesh::draw_triangles() const {
+void ResidentMesh::draw_triangles(std::size_t step) const {
   glBindVertexArray(array_.name());
-  glDrawElements(GL_TRIANGLES, index_count_, GL_UNSIGNED_SHORT, nullptr);
+  glDrawElements(GL_TRIANGLES, index_count(step), GL_UNSIGNED_SHORT,
+                 reinterpret_cast<const void*>(steps_[step].first_index * sizeof(std::uint16_t)));
 }
 
-void ResidentMesh::draw_lines(const gpu::RenderThread& thread) {
+void ResidentMesh::draw_lines(const gpu::RenderThread& thread, std::size_t step) {
   glBindVertexArray(array_.name());
-  if (!lines_) make_lines(thread);
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, lines_.name());
-  glDrawElements(GL_LINES, line_index_count_, GL_UNSIGNED_SHORT, nullptr);
+  Lines& lines = lines_[step];
+  if (!lines.indices) lines = make_lines(thread, steps_[step]);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, lines.indices.name());
+  glDrawElements(GL_LINES, lines.index_count, GL_UNSIGNED_SHORT, nullptr);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_.name());
 }
 
-void ResidentMesh::make_lines(const gpu::RenderThread& thread) {
-  lines_ = gpu::Buffer(thread);
-  const auto count = static_cast<std::size_t>(index_count_);
-  const void* indices = glMapBufferRange(GL_ELEMENT_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(count * sizeof(std::uint16_t)),
-                                         GL_MAP_READ_BIT);
-  if (!indices) return;
-  const auto lines = edges_of(static_cast<const std::uint16_t*>(indices), count);
+ResidentMesh::Lines ResidentMesh::make_lines(const gpu::RenderThread& thread, const surface::MeshStep& step) {
+  Lines lines{gpu::Buffer(thread)};
+  const auto first = static_cast<GLintptr>(step.first_index * sizeof(std::uint16_t));
+  const void* indices = glMapBufferRange(GL_ELEMENT_ARRAY_BUFFER, first,
+                                         static_cast<GLsizeiptr>(step.index_count * sizeof(std::uint16_t)), GL_MAP_READ_BIT);
+  if (!indices) return lines;
+  const auto edges = edges_of(static_cast<const std::uint16_t*>(indices), step.index_count);
   glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
-  const std::size_t line_bytes = lines.size() * sizeof(std::uint16_t);
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, lines_.name());
-  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(line_bytes), lines.data(), GL_STATIC_DRAW);
-  line_index_count_ = static_cast<int>(lines.size());
+  const std::size_t line_bytes = edges.size() * sizeof(std::uint16_t);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, lines.indices.name());
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(line_bytes), edges.data(), GL_STATIC_DRAW);
+  lines.index_count = static_cast<int>(edges.size());
   bytes_ += line_bytes;
   budget_->used += line_bytes;
+  return lines;
 }
 
 }  // namespace tellurion::render

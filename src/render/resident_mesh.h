@@ -1,7 +1,9 @@
 // A tile's triangles on the GPU.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -19,11 +21,12 @@ class ResidentMesh {
   ResidentMesh(const ResidentMesh&) = delete;
   ResidentMesh& operator=(const ResidentMesh&) = delete;
 
-  void draw_triangles() const;
+  /// `step`: one of the mesh's triangulations.
+  void draw_triangles(std::size_t step) const;
   /// The triangles' edges; their indices are made when first asked for.
-  void draw_lines(const gpu::RenderThread& thread);
+  void draw_lines(const gpu::RenderThread& thread, std::size_t step);
 
-  int index_count() const { return index_count_; }
+  int index_count(std::size_t step) const { return static_cast<int>(steps_[step].index_count); }
   /// The origin at `exaggeration`, body-centred.
   glm::dvec3 origin(double exaggeration) const { return origin_base_ + exaggeration * reference_height_ * origin_up_; }
   const glm::dvec3& origin_up() const { return origin_up_; }
@@ -37,7 +40,11 @@ class ResidentMesh {
   Box box(double exaggeration) const;
 
  private:
-  void make_lines(const gpu::RenderThread& thread);
+  struct Lines {
+    gpu::Buffer indices;
+    int index_count = 0;
+  };
+  Lines make_lines(const gpu::RenderThread& thread, const surface::MeshStep& step);
   void measure_box(const surface::TileMesh& mesh);
 
   Budget* budget_;
@@ -45,9 +52,8 @@ class ResidentMesh {
   gpu::VertexArray array_;
   gpu::Buffer vertices_;
   gpu::Buffer indices_;
-  gpu::Buffer lines_;
-  int index_count_ = 0;
-  int line_index_count_ = 0;
+  std::vector<surface::MeshStep> steps_;
+  std::array<Lines, surface::kMostMeshSteps> lines_;
   glm::dvec3 origin_base_;
   glm::dvec3 origin_up_;
   double reference_height_;

@@ -136,10 +136,10 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     glUniform4fv(program->locations[0], kTileVectors, &u.v[0].x);
 
     if (features & wireframe) {
-      mesh.draw_lines(thread);
+      mesh.draw_lines(thread, tile.step);
     } else {
-      mesh.draw_triangles();
-      figures.triangles += mesh.index_count() / 3;
+      mesh.draw_triangles(tile.step);
+      figures.triangles += mesh.index_count(tile.step) / 3;
     }
     ++figures.draws;
   }

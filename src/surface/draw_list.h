@@ -19,6 +19,7 @@ struct DrawTile {
   float skirt_depth = 0.0f;          ///< metres, exaggeration included
   float error_px = 0.0f;             ///< what the cut thinks of it
   double distance = 0.0;             ///< metres, of the nearest point of its bounds
+  std::uint8_t step = 0;             ///< of its mesh
 };
 
 }  // namespace tellurion::surface

@@ -32,12 +32,12 @@ constexpr int kRun = 16;  ///< samples of a row that are left out together
 constexpr double kWorthALook = 0.4;
 constexpr double kBetweenPlaces = 1.15;
 
-constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), 0.0f};
+constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), {}};
 
 void include(TileRecord& record, const TileRecord& part) {
   record.min_height = std::min(record.min_height, part.min_height);
   record.max_height = std::max(record.max_height, part.max_height);
-  record.error = std::max(record.error, part.error);
+  record.error = larger(record.error, part.error);
 }
 
 /// Whether the table ends with this tile.
@@ -54,6 +54,8 @@ struct OnPath {
   std::vector<double> heights;
   TileRecord record = kNothingYet;
   double worst = 0.0;  ///< largest distance so far between the data and the grid
+  DeviationTally tally;    ///< of evenly spread places, by the area of the leaves
+  DeviationTally in_leaf;  ///< of the leaf being scanned, each as one
 
   /// The distance at a place. `slack`: how far the surface may be from `metres` round there.
   double compare(glm::dvec2 uv, double metres, double slack = 0.0) {
@@ -131,8 +133,9 @@ class Scanner {
 
   static TileRecord finished(const OnPath& tile) {
     TileRecord record = tile.record;
-    const double error = kBetweenPlaces * tile.worst;
-    if (error > 0.0) record.error = std::max(record.error, std::nextafter(static_cast<float>(error), INFINITY));
+    const auto rounded_up = [](double metres) { return metres > 0.0 ? std::nextafter(static_cast<float>(metres), INFINITY) : 0.0f; };
+    const double bound = kBetweenPlaces * tile.worst;
+    record.error = larger(record.error, {rounded_up(bound), rounded_up(std::min(tile.tally.common(), bound))});
     return record;
   }
 
@@ -144,6 +147,11 @@ class Scanner {
     const bool finer_than_data = nominal_grid_spacing(model_.description().ellipsoid, leaf.key.level) <= 0.75 * finest;
     const Result<void> scanned = finer_than_data ? compare_fine_grid() : compare_samples();
     if (!scanned) return scanned;
+    for (OnPath& tile : path_) {
+      const double count = tile.in_leaf.count();
+      if (count > 0.0) tile.tally.add(tile.in_leaf, std::ldexp(1.0, -2 * leaf.key.level) / count);
+      tile.in_leaf = {};
+    }
     for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
       path_[i].record.min_height = std::min(path_[i].record.min_height, leaf.record.min_height);
       path_[i].record.max_height = std::max(path_[i].record.max_height, leaf.record.max_height);
@@ -160,10 +168,11 @@ class Scanner {
     for (std::size_t i = 0; i < field->heights.size(); ++i) {
       const glm::dvec2 share = glm::dvec2(i % kGridSide, i / kGridSide) / static_cast<double>(kGridSide - 1);
       const glm::dvec2 uv = glm::mix(path_.back().rect.lower, path_.back().rect.upper, share);
-      for (OnPath& tile : path_) tile.compare(uv, field->heights[i], field->error);
+      for (OnPath& tile : path_) tile.in_leaf.add(tile.compare(uv, field->heights[i], static_cast<double>(field->error.bound)));
     }
     const auto [lowest, highest] = std::minmax_element(field->heights.begin(), field->heights.end());
-    extend_range(*lowest - field->error, *highest + field->error);
+    const auto beyond = static_cast<double>(field->error.bound);
+    extend_range(*lowest - beyond, *highest + beyond);
     return {};
   }
 
@@ -205,7 +214,10 @@ class Scanner {
     metres_.resize(normals.size());
     if (Result<void> read = model_.heights(normals, 0.0, metres_); !read) return read;
     for (std::size_t i = 0; i < uv.size(); ++i) {
-      for (OnPath& tile : path_) tile.compare(uv[i], metres_[i]);
+      for (OnPath& tile : path_) {
+        const double off = tile.compare(uv[i], metres_[i]);
+        if (inside_too) tile.in_leaf.add(off);
+      }
     }
     const auto [lowest, highest] = std::minmax_element(metres_.begin(), metres_.end());
     extend_range(*lowest, *highest);
@@ -232,7 +244,7 @@ class Scanner {
       if (Result<void> read = read_row(raster, window.x, window.y + row, window.width, ring); !read) return read;
       for (std::size_t x = 0; x < width; ++x) {
         FaceSample& here = row_[x];
-        if (here.within) compare_sample(here);
+        if (here.within) compare_sample(here, is_finest);
         if (is_finest && x > 0) compare_cell(above_[x - 1], above_[x], row_[x - 1], here);
       }
       std::swap(row_, above_);
@@ -240,10 +252,11 @@ class Scanner {
     return {};
   }
 
-  void compare_sample(FaceSample& sample) {
+  void compare_sample(FaceSample& sample, bool counts) {
     for (OnPath& tile : path_) {
       sample.off_parent = sample.off_leaf;
       sample.off_leaf = tile.compare(sample.uv, sample.metres);
+      if (counts) tile.in_leaf.add(sample.off_leaf);
     }
   }
 
@@ -367,7 +380,7 @@ double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
 }
 
 std::string table_revision(const SurfaceDescription& description) {
-  std::string revision = "grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
+  std::string revision = "bound and common error, grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
   for (const Layer& layer : description.heights) {
     if (!is_scanned(layer)) continue;
     revision += layer.adds ? "\n+" : "\n=";

@@ -10,6 +10,7 @@
 
 #include "base/result.h"
 #include "geo/tile_key.h"
+#include "surface/height_error.h"
 
 namespace tellurion::surface {
 
@@ -17,7 +18,7 @@ namespace tellurion::surface {
 struct TileRecord {
   float min_height = 0;  ///< metres above the ellipsoid, of the finest data
   float max_height = 0;
-  float error = 0;       ///< largest |finest data - the tile's own full grid|, at least that of every tile below; metres
+  HeightError error;     ///< of the tile's own full grid, at least that of every tile below
 
   friend bool operator==(const TileRecord&, const TileRecord&) = default;
 };

@@ -15,7 +15,8 @@ namespace tellurion::surface {
 namespace {
 
 constexpr int kCells = kGridSide - 1;
-constexpr int kFineSide = 2 * kGridSide + 1;  ///< half steps over the tile, and one more beyond each border
+constexpr int kHalfSteps = 2 * kGridSide - 1;
+constexpr int kFineSide = kHalfSteps + 2;  ///< half steps over the tile, and one more beyond each border
 
 struct Range {
   double low = std::numeric_limits<double>::infinity();
@@ -27,13 +28,28 @@ struct Range {
   double width() const { return high - low; }
 };
 
+/// The samples of all layers within the tile.
+Result<void> add_samples(ElevationModel& model, const geo::TileKey& key, FinestHeights& finest) {
+  std::vector<geo::LatLon> places;
+  for (std::size_t i = 0; i < model.layer_count(); ++i) {
+    if (!model.layer(i).source->coverage().touches(key)) continue;
+    for (const TileSample& sample : samples_under(model.raster(i).reader(), model.raster(i).description(), key)) {
+      places.push_back(sample.place);
+      finest.places.push_back(sample.st * static_cast<double>(kCells));
+    }
+  }
+  finest.samples.resize(places.size());
+  return model.heights(places, 0.0, finest.samples);
+}
+
 }  // namespace
 
-Result<HeightField> field_of_known_error(ElevationModel& model, const geo::TileKey& key, double error) {
+Result<HeightField> field_of_known_error(ElevationModel& model, const geo::TileKey& key, const HeightError& error) {
   HeightField field;
   field.normals = grid_normals(key, kGridSide);
   field.heights.resize(field.normals.size());
   field.error = error;
+  field.judged_error = static_cast<double>(judged(error));
   const double spacing = nominal_grid_spacing(model.description().ellipsoid, key.level);
   if (Result<void> read = model.heights(field.normals, spacing, field.heights); !read) return read.error();
   return field;
@@ -45,7 +61,6 @@ Result<HeightField> field_of_finest_data(ElevationModel& model, const geo::TileK
   std::vector<double> heights(normals.size());
   if (Result<void> read = model.heights(normals, 0.0, heights); !read) return read.error();
   HeightField field;
-  field.error = error_between_samples(heights);
   // The grid's own places again, not those of the finer one: neighbours share them to the bit.
   field.normals = grid_normals(key, kGridSide);
   field.heights.reserve(field.normals.size());
@@ -54,40 +69,46 @@ Result<HeightField> field_of_finest_data(ElevationModel& model, const geo::TileK
       field.heights.push_back(heights[static_cast<std::size_t>((2 * row + 1) * kFineSide + 2 * column + 1)]);
     }
   }
-  constexpr int kHalfSteps = 2 * kGridSide - 1;
-  field.fine.reserve(static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
+  field.finest.half_steps.reserve(static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
   for (int row = 1; row <= kHalfSteps; ++row) {
     const double* first = heights.data() + row * kFineSide + 1;
-    field.fine.insert(field.fine.end(), first, first + kHalfSteps);
+    field.finest.half_steps.insert(field.finest.half_steps.end(), first, first + kHalfSteps);
   }
+  if (Result<void> read = add_samples(model, key, field.finest); !read) return read.error();
+  const HeightError found = field.finest.deviation_of(field.heights);
+  field.error = {static_cast<float>(error_between_samples(heights)), found.common};
+  field.judged_error = static_cast<double>(judged(found));
   return field;
 }
 
-Result<double> measured_error(ElevationModel& model, const geo::TileKey& key, std::span<const double> drawn,
-                              std::span<const double> fine) {
-  constexpr int kHalfSteps = 2 * kGridSide - 1;
+HeightError FinestHeights::deviation_of(std::span<const double> drawn) const {
   constexpr double kBetweenPlaces = 1.1;
-  assert(drawn.size() == static_cast<std::size_t>(kGridSide) * kGridSide && fine.size() == static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
-  double largest = 0.0;
-  for (int y = 0; y < kHalfSteps; ++y) {
-    for (int x = 0; x < kHalfSteps; ++x) {
-      const double shown = interpolate_in_triangles(drawn, kGridSide, x / 2.0, y / 2.0);
-      largest = std::max(largest, std::abs(fine[static_cast<std::size_t>(y * kHalfSteps + x)] - shown));
+  assert(drawn.size() == static_cast<std::size_t>(kGridSide) * kGridSide);
+  assert(half_steps.size() == static_cast<std::size_t>(kHalfSteps) * kHalfSteps);
+  DeviationTally tally;
+  const auto compare = [&](int x, int y, double shown) {
+    tally.add(std::abs(half_steps[static_cast<std::size_t>(y * kHalfSteps + x)] - shown));
+  };
+  // Half-way between its points the full triangulation shows their mean, in the middle of a cell along its diagonal.
+  for (int row = 0; row < kGridSide; ++row) {
+    for (int column = 0; column < kGridSide; ++column) {
+      const double* at = drawn.data() + row * kGridSide + column;
+      const int x = 2 * column, y = 2 * row;
+      compare(x, y, at[0]);
+      if (column < kCells) compare(x + 1, y, (at[0] + at[1]) / 2.0);
+      if (row < kCells) compare(x, y + 1, (at[0] + at[kGridSide]) / 2.0);
+      if (column < kCells && row < kCells) {
+        const double ends = runs_down_right(column, row) ? at[0] + at[kGridSide + 1] : at[1] + at[kGridSide];
+        compare(x + 1, y + 1, ends / 2.0);
+      }
     }
   }
-  for (std::size_t i = 0; i < model.layer_count(); ++i) {
-    if (!model.layer(i).source->coverage().touches(key)) continue;
-    const std::vector<TileSample> samples = samples_under(model.raster(i).reader(), model.raster(i).description(), key);
-    std::vector<geo::LatLon> places(samples.size());
-    std::transform(samples.begin(), samples.end(), places.begin(), [](const TileSample& s) { return s.place; });
-    std::vector<double> metres(samples.size());
-    if (Result<void> read = model.heights(places, 0.0, metres); !read) return read.error();
-    for (std::size_t n = 0; n < samples.size(); ++n) {
-      const glm::dvec2 grid = samples[n].st * static_cast<double>(kCells);
-      largest = std::max(largest, std::abs(metres[n] - interpolate_in_triangles(drawn, kGridSide, grid.x, grid.y)));
-    }
+  const auto common = static_cast<float>(tally.common());
+  double largest = tally.largest();
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    largest = std::max(largest, std::abs(samples[i] - interpolate_in_triangles(drawn, kGridSide, places[i].x, places[i].y)));
   }
-  return kBetweenPlaces * largest;
+  return {static_cast<float>(kBetweenPlaces * largest), common};
 }
 
 // Let f be the surface, g = f - (its interpolation over a triangle T of the grid), in units of the grid's step, so that T's

@@ -9,11 +9,11 @@ namespace {
 constexpr int kFinerLevels = 3;       ///< how far below a missing tile finer ones are looked for
 constexpr double kSkirtPixels = 2;
 
-/// What a tile deviates by while it also shows its parent's heights.
+/// What a tile deviates by at most while it also shows its parent's heights.
 double shown_error(const Node& node) {
-  if (node.morph >= 1 || node.is_root()) return node.error_m;
+  if (node.morph >= 1 || node.is_root()) return node.shown_bound_m;
   const Node& parent = *node.parent;
-  return std::max(node.error_m, parent.error_known ? parent.error_m : 4 * node.error_m);
+  return std::max(node.shown_bound_m, parent.error_known ? parent.bound_m : 4 * node.shown_bound_m);
 }
 
 bool shows_colour(const Node& node) { return node.is_root() || node.resident(Part::colour) != nullptr; }
@@ -29,6 +29,7 @@ void DrawnCut::find(const SelectionFrame& frame, std::vector<DrawTile>& tiles, S
   });
   for (Node* node : nodes_) {
     advance(frame, *node);
+    wanted_.choose_step(frame, *node);
     mark_border(frame, *node);
   }
   tiles.clear();
@@ -170,7 +171,7 @@ DrawTile DrawnCut::tile_of(const SelectionFrame& frame, Node& node) {
   const double skirt = shown_error(node) + beyond + kSkirtPixels * frame.errors.pixel_angle * distance;
 
   // A slot of an ancestor shows larger texels than the tile's own; that counts unless there is nothing finer to show.
-  double error_px = node.error_px;
+  double error_px = std::max(node.error_px, node.shown_px);
   if (node.colour_to != node.colour_owner) {
     const double texel = texel_metres(node.colour_to->shape);
     error_px = std::max(error_px, to_pixels(frame.errors, texel, node.distance) * node.texel_share);
@@ -185,6 +186,7 @@ DrawTile DrawnCut::tile_of(const SelectionFrame& frame, Node& node) {
   tile.skirt_depth = static_cast<float>(skirt);
   tile.error_px = static_cast<float>(error_px);
   tile.distance = node.distance;
+  tile.step = node.step;
   return tile;
 }
 

@@ -12,14 +12,16 @@ constexpr double kSlotTexels = kColourSlotSide - 2 * kColourGutter;
 
 }  // namespace
 
-double error_metres(const ErrorView& view, double height_error, double curvature_error, double max_height) {
+DisplayedError displayed_error(const ErrorView& view, const MeshError& error, double max_height) {
   const double raised = 1 + view.exaggeration * std::max(max_height, 0.0) / view.body_radius;
-  return height_error * view.exaggeration + curvature_error * raised;
+  const double curvature = static_cast<double>(error.curvature) * raised;
+  return {static_cast<double>(judged(error.height)) * view.exaggeration + curvature,
+          static_cast<double>(error.height.bound) * view.exaggeration + curvature};
 }
 
-double full_grid_curvature_error(const geo::Ellipsoid& ellipsoid, const TileShape& shape) {
+float full_grid_curvature_error(const geo::Ellipsoid& ellipsoid, const TileShape& shape) {
   const double smallest_radius = ellipsoid.b() * ellipsoid.b() / ellipsoid.a();
-  return shape.grid_diagonal * shape.grid_diagonal / (8 * smallest_radius);
+  return static_cast<float>(shape.grid_diagonal * shape.grid_diagonal / (8 * smallest_radius));
 }
 
 double precision_metres(const TileShape& shape) { return 4 * 1e-7 * shape.size; }

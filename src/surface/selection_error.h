@@ -31,13 +31,19 @@ inline double to_pixels(const ErrorView& view, double metres, double distance) {
   return metres / ((distance > kNearestDistance ? distance : kNearestDistance) * view.pixel_angle);
 }
 
-/// Deviation of a tile from the truth as displayed, metres: the height's grows with the exaggeration; the chord's under the
-/// body's curvature grows with the radius at which the displaced surface lies.
-double error_metres(const ErrorView& view, double height_error, double curvature_error, double max_height);
+/// Deviation of a tile from the truth as displayed, metres.
+struct DisplayedError {
+  double judged = 0;  ///< see judged(HeightError)
+  double bound = 0;   ///< nowhere more
+};
+
+/// The height's deviation grows with the exaggeration; the chord's under the body's curvature grows with the radius at which
+/// the displaced surface lies.
+DisplayedError displayed_error(const ErrorView& view, const MeshError& error, double max_height);
 
 /// The part of the error that comes from the body's curvature when all samples of the height grid are drawn: the sag of the
 /// longest diagonal, at the smallest radius of curvature.
-double full_grid_curvature_error(const geo::Ellipsoid& ellipsoid, const TileShape& shape);
+float full_grid_curvature_error(const geo::Ellipsoid& ellipsoid, const TileShape& shape);
 
 /// Float vertices err by up to 1e-7 of the tile's size; that has to stay below a quarter of the wanted error.
 double precision_metres(const TileShape& shape);

@@ -43,7 +43,7 @@ struct Node {
   // What follows from the key.
   TileShape shape;
   TileFacts facts;
-  double full_grid_error = 0;   ///< full_grid_curvature_error
+  float full_grid_error = 0;    ///< full_grid_curvature_error
   std::array<NodePart, kPartCount> parts;
 
   // Bounds, kept as long as the heights stay.
@@ -58,7 +58,8 @@ struct Node {
   bool split = false;           ///< the wanted cut lies below
   PlaneSet planes = kAllPlanes; ///< crossed by the box
   double distance = 0;
-  double error_m = 0;           ///< of the geometry as displayed, metres
+  double error_m = 0;           ///< of the finest geometry as displayed, metres, judged;
+  double bound_m = 0;           ///< and at most
   double geometry_px = 0;
   double texel_share = 0;       ///< see visible_share
   double error_px = 0;
@@ -74,6 +75,9 @@ struct Node {
   Node* colour_from = nullptr;
   float fade = 1;
   float morph = 1;
+  std::uint8_t step = 0;        ///< of the mesh
+  double shown_bound_m = 0;     ///< as bound_m, of that step
+  double shown_px = 0;          ///< as geometry_px
   FrameNumber bordered = 0;     ///< last frame in which it or a descendant was drawn,
   double border_error_m = 0;    ///< and the largest error among those
 

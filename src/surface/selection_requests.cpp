@@ -8,14 +8,6 @@ namespace {
 
 constexpr int kLevelsBetweenSteps = 3;
 
-/// The height error of a node's parent, a pure function of its key: what the facts say, else what it was built with.
-double error_of_parent(const Node& node) {
-  if (node.is_root()) return 0;
-  if (node.parent->facts.height_error) return *node.parent->facts.height_error;
-  const Resident* geometry = node.parent->resident(Part::geometry);
-  return geometry != nullptr ? geometry->metrics.height_error : 0;
-}
-
 }  // namespace
 
 void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& requests, SelectionStats& stats) {
@@ -44,7 +36,7 @@ void RequestList::want(const SelectionFrame& frame, Node& node, Part part, doubl
   }
   node.requested[p] = frame.number;
   node.request_index[p] = static_cast<std::uint32_t>(requests_.size());
-  requests_.push_back({node.key, part, std::max(gain_px, 0.0), error_of_parent(node)});
+  requests_.push_back({node.key, part, std::max(gain_px, 0.0)});
 }
 
 /// Asks for the slot of the node's colour owner; true if it is resident already.

@@ -46,6 +46,13 @@ void inherit_owners(Node& node) {
 
 }  // namespace
 
+std::size_t bytes_of_tile(const TileFacts& facts) {
+  constexpr std::size_t kMesh = 96u << 10;
+  constexpr std::size_t kSlopes = kSlopeSlotSide * kSlopeSlotSide * 4 * 4 / 3;
+  constexpr std::size_t kColour = kColourSlotSide * kColourSlotSide * 4 * 4 / 3;
+  return kMesh + (facts.own_slopes ? kSlopes : 0) + (facts.own_colour ? kColour : 0);
+}
+
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
                           FrameNumber number, TimePoint now) {
   double lowest = 0;
@@ -74,14 +81,17 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
 
   const Resident* geometry = node.resident(Part::geometry);
   node.error_known = node.facts.height_error.has_value() || geometry != nullptr;
-  node.error_m = 0;
+  node.error_m = node.bound_m = 0;
   if (node.facts.height_error) {
-    node.error_m = error_metres(frame.errors, *node.facts.height_error, node.full_grid_error, node.facts.max_height);
+    const DisplayedError full = displayed_error(frame.errors, {*node.facts.height_error, node.full_grid_error}, node.facts.max_height);
+    node.error_m = full.judged;
+    node.bound_m = full.bound;
   }
   if (geometry != nullptr) {
     const TileMetrics& built = geometry->metrics;
-    node.error_m = std::max(
-        node.error_m, error_metres(frame.errors, built.height_error, built.curvature_error, built.max_height));
+    const DisplayedError finest = displayed_error(frame.errors, built.steps.front(), built.max_height);
+    node.error_m = std::max(node.error_m, finest.judged);
+    node.bound_m = std::max(node.bound_m, finest.bound);
   }
   node.distance = distance_to(node.box, frame.errors.eye);
   node.geometry_px = to_pixels(frame.errors, std::max(node.error_m, precision_metres(node.shape)), node.distance);
@@ -90,6 +100,24 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
   if (node.facts.finer_colour_below) {
     const double texel_px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share;
     node.error_px = std::max(node.error_px, texel_px);
+  }
+}
+
+void WantedCut::choose_step(const SelectionFrame& frame, Node& node) const {
+  node.step = 0;
+  node.shown_bound_m = node.bound_m;
+  node.shown_px = node.geometry_px;
+  const Resident* geometry = node.resident(Part::geometry);
+  if (geometry == nullptr || frame.settings.metric != LodMetric::screen_space_error) return;
+  const TileMetrics& built = geometry->metrics;
+  for (int step = built.step_count - 1; step > 0; --step) {
+    const DisplayedError error = displayed_error(frame.errors, built.steps[static_cast<std::size_t>(step)], built.max_height);
+    const double px = to_pixels(frame.errors, std::max(error.judged, precision_metres(node.shape)), node.distance);
+    if (px > effective_sse_px_) continue;
+    node.step = static_cast<std::uint8_t>(step);
+    node.shown_bound_m = std::max(node.bound_m, error.bound);
+    node.shown_px = std::max(node.geometry_px, px);
+    return;
   }
 }
 
@@ -115,7 +143,8 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
   node.split = wants_split(frame, node);
   if (!node.split) {
     ++selected_;
-  } else if (static_cast<std::size_t>(selected_) <= kHopelessFactor * frame.settings.max_tiles) {
+    selected_bytes_ += bytes_of_tile(node.facts);
+  } else if (within(frame.settings, kHopelessFactor)) {
     pool_.add_children(node);
     for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);
   }
@@ -124,11 +153,16 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
 
 bool WantedCut::fits(const SelectionFrame& frame, int steps) {
   visited_ = selected_ = 0;
+  selected_bytes_ = 0;
   effective_sse_px_ = frame.settings.sse_px * std::pow(kErrorStep, steps);
   split_distance_ = split_distance_in_sizes(frame.errors, effective_sse_px_);
   split_solid_angle_ = split_solid_angle(frame.errors, effective_sse_px_);
   for (Node& root : pool_.roots()) refine(frame, root);
-  return static_cast<std::size_t>(selected_) <= frame.settings.max_tiles;
+  return within(frame.settings, 1);
+}
+
+bool WantedCut::within(const SelectionSettings& settings, std::size_t factor) const {
+  return static_cast<std::size_t>(selected_) / factor <= settings.max_tiles && selected_bytes_ / factor <= settings.max_bytes;
 }
 
 void WantedCut::find(const SelectionFrame& frame) {

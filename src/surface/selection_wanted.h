@@ -32,7 +32,7 @@ class WantedCut {
  public:
   WantedCut(NodePool& pool, std::array<UseOrder, kPartCount>& orders) : pool_(pool), orders_(orders) {}
 
-  /// The wanted error is raised to sse_px * 1.25^k with the smallest k that selects at most settings.max_tiles.
+  /// The wanted error is raised to sse_px * 1.25^k with the smallest k that keeps to settings.max_tiles and max_bytes.
   void find(const SelectionFrame& frame);
 
   double effective_sse_px() const { return effective_sse_px_; }
@@ -41,9 +41,13 @@ class WantedCut {
 
   /// Judges `node` once per frame; its parent has been judged before.
   void see(const SelectionFrame& frame, Node& node) const;
+  /// The coarsest triangulation of a resident mesh that is good enough; the finest if none is, or for metrics without errors.
+  void choose_step(const SelectionFrame& frame, Node& node) const;
 
  private:
   bool fits(const SelectionFrame& frame, int steps);
+  /// Whether what was selected is at most `factor` times what is allowed.
+  bool within(const SelectionSettings& settings, std::size_t factor) const;
   void refine(const SelectionFrame& frame, Node& node);
   bool wants_split(const SelectionFrame& frame, const Node& node) const;
 
@@ -55,6 +59,7 @@ class WantedCut {
   double split_solid_angle_ = 0;
   int visited_ = 0;
   int selected_ = 0;
+  std::size_t selected_bytes_ = 0;
 };
 
 }  // namespace tellurion::surface

@@ -4,14 +4,15 @@
 #include <optional>
 
 #include "geo/tile_key.h"
+#include "surface/height_error.h"
 
 namespace tellurion::surface {
 
 struct TileFacts {
   float min_height = 0;               ///< bounds of the heights under the tile, metres above the ellipsoid
   float max_height = 0;
-  std::optional<float> height_error;  ///< largest deviation of the tile's own height grid from the finest data, metres, at
-                                      ///< exaggeration 1, at least that of every descendant. Nothing: known once it is built
+  std::optional<HeightError> height_error;  ///< of the tile's own height grid, at least that of every descendant.
+                                            ///< Nothing: known once it is built
   bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
   bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels

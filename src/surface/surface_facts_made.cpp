@@ -42,10 +42,10 @@ class MadeFacts final : public SurfaceFacts {
       facts.max_height = std::max(facts.max_height, kAssumedMaxHeight);
       if (spacing > kFinestGridOfTable * finest_height) {
         const auto error = static_cast<float>(kAssumedSlope * spacing * std::numbers::sqrt2 / 2.0);
-        facts.height_error = std::max(facts.height_error.value_or(0.0f), error);
+        facts.height_error = larger(facts.height_error.value_or(HeightError{}), {error, error});
       }
     }
-    if (!facts.height_error && finest_height == std::numeric_limits<double>::infinity()) facts.height_error = 0.0f;
+    if (!facts.height_error && finest_height == std::numeric_limits<double>::infinity()) facts.height_error = HeightError{};
 
     const double finest_colour = finest_spacing(description_->colours, key);
     const double colour_texel = nominal_colour_texel(ellipsoid, key.level);

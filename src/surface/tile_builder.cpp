@@ -1,7 +1,9 @@
 #include "surface/tile_builder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -43,23 +45,37 @@ Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceF
 }
 
 /// The error of the nearest ancestor for which it is known: nothing below can be worse.
-double error_of_ancestors(const SurfaceFacts& facts, geo::TileKey key) {
+HeightError error_of_ancestors(const SurfaceFacts& facts, geo::TileKey key) {
   while (key.level > 0) {
     key = geo::parent(key);
-    if (const std::optional<float> error = facts.facts_of(key).height_error) return static_cast<double>(*error);
+    if (const std::optional<HeightError> error = facts.facts_of(key).height_error) return *error;
   }
-  return std::numeric_limits<double>::infinity();
+  return {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
+}
+
+/// Of a triangulation of the field.
+HeightError error_of_step(const HeightField& field, const DecimatedStep& step) {
+  DeviationTally tally;
+  for (std::size_t i = 0; i < step.drawn.size(); ++i) tally.add(std::abs(step.drawn[i] - field.heights[i]));
+  const double sideways = step.sideways_deviation;
+  const HeightError added{field.error.bound + static_cast<float>(step.height_deviation),
+                          field.error.common + static_cast<float>(tally.common() + sideways)};
+  if (field.finest.half_steps.empty()) return added;
+  const HeightError measured = field.finest.deviation_of(step.drawn);
+  return {std::min(added.bound, measured.bound + static_cast<float>(sideways)), measured.common + static_cast<float>(sideways)};
 }
 
 }  // namespace
 
 Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key,
-                                    double parent_error, const MeshSettings& settings, std::stop_token stop) {
+                                    const MeshSettings& settings, std::stop_token stop) {
   const TileFacts known = facts.facts_of(key);
-  Result<HeightField> field =
-      known.height_error ? field_of_known_error(model, key, static_cast<double>(*known.height_error)) : field_of_finest_data(model, key);
+  Result<HeightField> field = known.height_error ? field_of_known_error(model, key, *known.height_error) : field_of_finest_data(model, key);
   if (!field) return field.error();
-  if (!known.height_error) field->error = std::min(field->error, error_of_ancestors(facts, key));
+  if (!known.height_error) {
+    const HeightError above = error_of_ancestors(facts, key);
+    field->error = {std::min(field->error.bound, above.bound), std::min(field->error.common, above.common)};
+  }
   if (stop.stop_requested()) return Error{ErrorCode::cancelled, "geometry of " + geo::to_string(key)};
 
   std::vector<double> parents = field->heights;
@@ -71,24 +87,19 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
 
   const geo::Ellipsoid& ellipsoid = model.description().ellipsoid;
   const double least = settings.of_tile_size * nominal_tile_size(ellipsoid, key.level);
-  const double of_parent = std::min(settings.of_parent_error * parent_error - field->error, 4.0 * least);
-  const MeshTolerance tolerance{std::max({settings.of_grid_error * field->error, of_parent, least}), least};
-  DecimatedMesh decimated = make_tile_mesh(ellipsoid, key, field->normals, field->heights, parents, tolerance);
+  const MeshTolerance tolerance{std::max(settings.of_grid_error * field->judged_error, least), least};
+  DecimatedMesh decimated = make_tile_mesh(ellipsoid, key, field->normals, field->heights, parents, tolerance, settings.limits);
 
   TileGeometry geometry;
   geometry.mesh = std::move(decimated.mesh);
-  double error = field->error + decimated.height_deviation;
-  if (!known.height_error) {
-    const Result<double> measured = measured_error(model, key, decimated.drawn, field->fine);
-    if (!measured) return measured.error();
-    error = std::min(error, *measured + decimated.sideways_deviation);
+  geometry.metrics.step_count = static_cast<std::uint8_t>(decimated.steps.size());
+  for (std::size_t i = 0; i < decimated.steps.size(); ++i) {
+    geometry.metrics.steps[i] = {error_of_step(*field, decimated.steps[i]), static_cast<float>(decimated.steps[i].curvature_deviation)};
   }
-  geometry.metrics.height_error = static_cast<float>(error);
-  geometry.metrics.curvature_error = static_cast<float>(decimated.curvature_deviation);
   const auto [lowest, highest] = std::minmax_element(field->heights.begin(), field->heights.end());
   // The drawn heights, and the true ones: as the facts have them or within the error of those drawn.
-  geometry.metrics.min_height = static_cast<float>(std::min(*lowest, std::max(*lowest - field->error, double{known.min_height})));
-  geometry.metrics.max_height = static_cast<float>(std::max(*highest, std::min(*highest + field->error, double{known.max_height})));
+  geometry.metrics.min_height = static_cast<float>(std::min(*lowest, std::max(*lowest - static_cast<double>(field->error.bound), double{known.min_height})));
+  geometry.metrics.max_height = static_cast<float>(std::max(*highest, std::min(*highest + static_cast<double>(field->error.bound), double{known.max_height})));
   if (known.own_slopes) {
     Result<SlopeMap> slopes = build_slopes(model, key, stop);
     if (!slopes) return slopes.error();

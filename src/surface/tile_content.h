@@ -12,6 +12,7 @@
 #include "geo/frames.h"
 #include "geo/tile_key.h"
 #include "raster/image.h"
+#include "surface/height_error.h"
 
 namespace tellurion::surface {
 
@@ -21,12 +22,20 @@ inline constexpr int kColourGutter = 4;        ///< texels of it beyond each bor
 inline constexpr int kSlopeSlotSide = 128;
 inline constexpr int kSlopeGutter = 2;
 
-/// Numbers that decide whether a tile is good enough. Bounds of the truth: the finest data under the tile.
+inline constexpr int kMostMeshSteps = 6;       ///< triangulations of a tile
+
+/// How far one triangulation of a tile is from the truth.
+struct MeshError {
+  HeightError height;   ///< of the drawn heights, against the finest data under the tile
+  float curvature = 0;  ///< largest deviation that comes from the body's curvature alone, metres
+};
+
+/// Numbers that decide whether a tile is good enough.
 struct TileMetrics {
-  float min_height = 0;       ///< metres above the ellipsoid, of the true and of the drawn surface
+  float min_height = 0;  ///< metres above the ellipsoid, of the true and of the drawn surface
   float max_height = 0;
-  float height_error = 0;     ///< largest deviation of the drawn heights from the finest data, at exaggeration 1, metres
-  float curvature_error = 0;  ///< largest deviation that comes from the body's curvature alone, metres
+  std::array<MeshError, kMostMeshSteps> steps{};  ///< of the mesh's steps, finest first
+  std::uint8_t step_count = 1;
 };
 
 /// One vertex. Position relative to the mesh's origin at exaggeration x, in Ecef axes, where
@@ -42,14 +51,21 @@ struct TileVertex {
   float skirt;            ///< 0 on the surface, 1 for the lower rim of the skirt
 };
 
+/// One triangulation out of a mesh's vertices: a range of its indices, the surface's triangles first, then the skirt's.
+struct MeshStep {
+  std::uint32_t first_index = 0;
+  std::uint32_t surface_index_count = 0;
+  std::uint32_t index_count = 0;
+};
+
 /// A tile's triangles, counter-clockwise seen from outside.
 struct TileMesh {
   geo::Point<geo::Ecef> origin_base;   ///< the tile centre's point of the bare ellipsoid
   geo::Vector<geo::Ecef> origin_up;    ///< unit normal there
   double reference_height = 0;         ///< metres; the origin at exaggeration x is origin_base + x * reference_height * origin_up
   std::vector<TileVertex> vertices;    ///< surface first, then the skirt's lower rim
-  std::vector<std::uint16_t> indices;  ///< surface triangles first, then skirt
-  std::uint32_t surface_index_count = 0;
+  std::vector<std::uint16_t> indices;
+  std::vector<MeshStep> steps;         ///< from the finest to the coarsest, 1 to kMostMeshSteps of them
 
   std::size_t bytes() const { return vertices.size() * sizeof(TileVertex) + indices.size() * sizeof(std::uint16_t); }
 };

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -59,84 +60,10 @@ void add_curvature(std::span<float> errors, double tile_size, double radius, dou
   }
 }
 
-/// Adds a wall below every border edge; its outer side is the front.
-void add_skirt(TileMesh& mesh, std::span<const std::uint32_t> grid_points) {
-  constexpr int kLast = kGridSide - 1;
-  struct OnBorder {
-    int along;
-    std::uint16_t vertex;
-  };
-  std::array<std::vector<OnBorder>, 4> sides;  // clockwise round the tile as seen from outside, north first
-  for (std::size_t v = 0; v < grid_points.size(); ++v) {
-    const int x = static_cast<int>(grid_points[v]) % kGridSide, y = static_cast<int>(grid_points[v]) / kGridSide;
-    const auto vertex = static_cast<std::uint16_t>(v);
-    if (y == 0) sides[0].push_back({x, vertex});
-    if (x == kLast) sides[1].push_back({y, vertex});
-    if (y == kLast) sides[2].push_back({kLast - x, vertex});
-    if (x == 0) sides[3].push_back({kLast - y, vertex});
-  }
-  constexpr std::uint16_t kNone = 0xffff;
-  std::vector<std::uint16_t> rim_of(mesh.vertices.size(), kNone);
-  const auto rim = [&](std::uint16_t top) {
-    if (rim_of[top] == kNone) {
-      rim_of[top] = static_cast<std::uint16_t>(mesh.vertices.size());
-      mesh.vertices.push_back(mesh.vertices[top]);
-      mesh.vertices.back().skirt = 1.0f;
-    }
-    return rim_of[top];
-  };
-  for (std::vector<OnBorder>& side : sides) {
-    std::sort(side.begin(), side.end(), [](const OnBorder& l, const OnBorder& r) { return l.along < r.along; });
-    for (std::size_t i = 0; i + 1 < side.size(); ++i) {
-      const std::uint16_t a = side[i].vertex, b = side[i + 1].vertex;
-      const std::uint16_t below_a = rim(a), below_b = rim(b);
-      for (const std::uint16_t index : {a, b, below_b, a, below_b, below_a}) mesh.indices.push_back(index);
-    }
-  }
-}
-
-}  // namespace
-
-DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey& key,
-                             std::span<const geo::Vector<geo::Ecef>> normals, std::span<const double> heights,
-                             std::span<const double> parent_heights, const MeshTolerance& tolerance) {
-  assert(normals.size() == kPointCount && heights.size() == kPointCount && parent_heights.size() == kPointCount);
-  const geo::Vector<geo::Ecef> origin_up = geo::tile_normal(key, {0.5, 0.5});
-  const geo::Point<geo::Ecef> origin = geo::surface_point(ellipsoid, origin_up);
-  std::vector<glm::dvec3> base(kPointCount);
-  for (std::size_t i = 0; i < kPointCount; ++i) base[i] = (geo::surface_point(ellipsoid, normals[i]) - origin).xyz;
-
-  // No normal section of an oblate ellipsoid is curved more than the meridian at the equator.
-  const double tightest_radius = ellipsoid.b() * ellipsoid.b() / ellipsoid.a();
-  std::vector<float> errors = true_errors(heights, kGridSide, tolerance.height);
-  for (float& error : errors) error = static_cast<float>(error / tolerance.height);
-  add_curvature(errors, nominal_tile_size(ellipsoid, key.level), tightest_radius, tolerance.curvature);
-  saturate_errors(errors, kGridSide);
-  const GridTriangles triangles = extract_triangles(errors, kGridSide, 1.0f);
-
-  DecimatedMesh out;
-  TileMesh& mesh = out.mesh;
-  const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
-  mesh.origin_base = origin;
-  mesh.origin_up = origin_up;
-  mesh.reference_height = (*lowest + *highest) / 2.0;
-  mesh.vertices.reserve(triangles.points.size() + 4 * kGridSide);
-  for (const std::uint32_t point : triangles.points) {
-    TileVertex vertex;
-    vertex.base = glm::vec3(base[point]);
-    vertex.up_offset = glm::vec3((normals[point] - origin_up).xyz);
-    vertex.height = static_cast<float>(heights[point] - mesh.reference_height);
-    vertex.parent_height = static_cast<float>(parent_heights[point] - mesh.reference_height);
-    vertex.st = glm::vec2(static_cast<float>(point % kGridSide), static_cast<float>(point / kGridSide)) /
-                static_cast<float>(kGridSide - 1);
-    vertex.skirt = 0.0f;
-    mesh.vertices.push_back(vertex);
-  }
-  mesh.indices.reserve(triangles.indices.size() + 4 * 6 * kGridSide);
-  for (const std::uint32_t index : triangles.indices) mesh.indices.push_back(static_cast<std::uint16_t>(index));
-  mesh.surface_index_count = static_cast<std::uint32_t>(mesh.indices.size());
-  add_skirt(mesh, triangles.points);
-
+/// How far triangles are from the full grid. `base`: the grid's points on the ellipsoid.
+DecimatedStep deviations_of(const GridTriangles& triangles, std::span<const glm::dvec3> base, std::span<const double> heights,
+                            double tightest_radius) {
+  DecimatedStep out;
   // A flat triangle also shifts its inside sideways against the grid's equi-angular coordinates: by less than
   // diameter^2 / (8 radius), measured over all triangles of a face (0.94 of it at worst), the same as its sag.
   for (std::size_t i = 0; i < triangles.indices.size(); i += 3) {
@@ -156,6 +83,131 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
     out.height_deviation = std::max(out.height_deviation, std::abs(out.drawn[i] - heights[i]));
   }
   out.height_deviation += out.sideways_deviation;
+  return out;
+}
+
+/// Adds walls below border edges; their outer sides are the front.
+class Skirt {
+ public:
+  /// `points`: grid index of every vertex of the surface.
+  Skirt(TileMesh& mesh, std::span<const std::uint32_t> points) : mesh_(mesh), points_(points), rim_of_(points.size(), kNone) {}
+
+  /// Below the border of the surface that the indices from `first` on make.
+  void add(std::size_t first) {
+    std::array<std::vector<OnBorder>, 4> sides;  // clockwise round the tile as seen from outside, north first
+    std::vector<bool> seen(points_.size(), false);
+    for (std::size_t i = first; i < mesh_.indices.size(); ++i) {
+      const std::uint16_t vertex = mesh_.indices[i];
+      if (seen[vertex]) continue;
+      seen[vertex] = true;
+      const int x = static_cast<int>(points_[vertex]) % kGridSide, y = static_cast<int>(points_[vertex]) / kGridSide;
+      if (y == 0) sides[0].push_back({x, vertex});
+      if (x == kLast) sides[1].push_back({y, vertex});
+      if (y == kLast) sides[2].push_back({kLast - x, vertex});
+      if (x == 0) sides[3].push_back({kLast - y, vertex});
+    }
+    for (std::vector<OnBorder>& side : sides) {
+      std::sort(side.begin(), side.end(), [](const OnBorder& l, const OnBorder& r) { return l.along < r.along; });
+      for (std::size_t i = 0; i + 1 < side.size(); ++i) {
+        const std::uint16_t a = side[i].vertex, b = side[i + 1].vertex;
+        const std::uint16_t below_a = rim(a), below_b = rim(b);
+        for (const std::uint16_t index : {a, b, below_b, a, below_b, below_a}) mesh_.indices.push_back(index);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kLast = kGridSide - 1;
+  static constexpr std::uint16_t kNone = 0xffff;
+  struct OnBorder {
+    int along;
+    std::uint16_t vertex;
+  };
+
+  std::uint16_t rim(std::uint16_t top) {
+    if (rim_of_[top] == kNone) {
+      rim_of_[top] = static_cast<std::uint16_t>(mesh_.vertices.size());
+      mesh_.vertices.push_back(TileVertex(mesh_.vertices[top]));
+      mesh_.vertices.back().skirt = 1.0f;
+    }
+    return rim_of_[top];
+  }
+
+  TileMesh& mesh_;
+  std::span<const std::uint32_t> points_;
+  std::vector<std::uint16_t> rim_of_;
+};
+
+/// Triangulations of errors in units of the finest tolerance, finest first.
+std::vector<GridTriangles> triangulations(std::span<const float> errors, const MeshLimits& limits) {
+  constexpr double kFewer = 0.8;              // a step that saves less is none
+  constexpr std::size_t kFewTriangles = 128;  // below that there is nothing to save
+  constexpr int kHopeless = 100;              // heights that no tolerance reaches
+  std::vector<GridTriangles> steps;
+  double scale = 1.0;
+  for (int i = 0; i < limits.most_steps || steps.empty(); ++i, scale *= limits.step_ratio) {
+    GridTriangles triangles = extract_triangles(errors, kGridSide, static_cast<float>(scale));
+    const std::size_t count = triangles.indices.size() / 3;
+    if (count > limits.most_triangles && i < kHopeless) continue;
+    if (!steps.empty() && static_cast<double>(count) > kFewer * static_cast<double>(steps.back().indices.size() / 3)) continue;
+    steps.push_back(std::move(triangles));
+    if (count < kFewTriangles) break;
+  }
+  return steps;
+}
+
+}  // namespace
+
+DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey& key,
+                             std::span<const geo::Vector<geo::Ecef>> normals, std::span<const double> heights,
+                             std::span<const double> parent_heights, const MeshTolerance& tolerance, const MeshLimits& limits) {
+  assert(normals.size() == kPointCount && heights.size() == kPointCount && parent_heights.size() == kPointCount);
+  const geo::Vector<geo::Ecef> origin_up = geo::tile_normal(key, {0.5, 0.5});
+  const geo::Point<geo::Ecef> origin = geo::surface_point(ellipsoid, origin_up);
+  std::vector<glm::dvec3> base(kPointCount);
+  for (std::size_t i = 0; i < kPointCount; ++i) base[i] = (geo::surface_point(ellipsoid, normals[i]) - origin).xyz;
+
+  // No normal section of an oblate ellipsoid is curved more than the meridian at the equator.
+  const double tightest_radius = ellipsoid.b() * ellipsoid.b() / ellipsoid.a();
+  std::vector<float> errors = true_errors(heights, kGridSide);
+  for (float& error : errors) error = static_cast<float>(error / tolerance.height);
+  add_curvature(errors, nominal_tile_size(ellipsoid, key.level), tightest_radius, tolerance.curvature);
+  saturate_errors(errors, kGridSide);
+  const std::vector<GridTriangles> steps = triangulations(errors, limits);
+
+  DecimatedMesh out;
+  TileMesh& mesh = out.mesh;
+  const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
+  mesh.origin_base = origin;
+  mesh.origin_up = origin_up;
+  mesh.reference_height = (*lowest + *highest) / 2.0;
+  // The coarser triangulations' points are among those of the finest.
+  const std::vector<std::uint32_t>& points = steps.front().points;
+  std::vector<std::uint16_t> vertex_of(kPointCount);
+  mesh.vertices.reserve(points.size() + 4 * kGridSide);
+  for (const std::uint32_t point : points) {
+    vertex_of[point] = static_cast<std::uint16_t>(mesh.vertices.size());
+    TileVertex vertex;
+    vertex.base = glm::vec3(base[point]);
+    vertex.up_offset = glm::vec3((normals[point] - origin_up).xyz);
+    vertex.height = static_cast<float>(heights[point] - mesh.reference_height);
+    vertex.parent_height = static_cast<float>(parent_heights[point] - mesh.reference_height);
+    vertex.st = glm::vec2(static_cast<float>(point % kGridSide), static_cast<float>(point / kGridSide)) /
+                static_cast<float>(kGridSide - 1);
+    vertex.skirt = 0.0f;
+    mesh.vertices.push_back(vertex);
+  }
+  Skirt skirt(mesh, points);
+  for (const GridTriangles& triangles : steps) {
+    MeshStep step;
+    step.first_index = static_cast<std::uint32_t>(mesh.indices.size());
+    for (const std::uint32_t index : triangles.indices) mesh.indices.push_back(vertex_of[triangles.points[index]]);
+    step.surface_index_count = static_cast<std::uint32_t>(triangles.indices.size());
+    skirt.add(step.first_index);
+    step.index_count = static_cast<std::uint32_t>(mesh.indices.size()) - step.first_index;
+    mesh.steps.push_back(step);
+    out.steps.push_back(deviations_of(triangles, base, heights, tightest_radius));
+  }
   return out;
 }
 

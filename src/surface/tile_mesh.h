@@ -17,9 +17,15 @@ struct MeshTolerance {
   double curvature = 0;  ///< of the bare ellipsoid: the sag of its arc over a triangle's edge
 };
 
-/// A mesh and how far it is from the full grid, measured after building.
-struct DecimatedMesh {
-  TileMesh mesh;
+/// How many triangulations a mesh gets, and how large it may become.
+struct MeshLimits {
+  double step_ratio = 1.3;              ///< of the tolerances of one triangulation and the one before it
+  int most_steps = kMostMeshSteps;
+  std::size_t most_triangles = 16384;   ///< of the finest; tolerances rise until it is kept
+};
+
+/// How far a triangulation is from the full grid, measured after building.
+struct DecimatedStep {
   std::vector<double> drawn;        ///< heights that the triangles show at the grid's points; between them they are linear over
                                     ///< the full triangulation (see interpolate_in_triangles)
   double height_deviation = 0;      ///< of heights, metres at exaggeration 1; sideways_deviation included
@@ -27,9 +33,16 @@ struct DecimatedMesh {
   double curvature_deviation = 0;   ///< metres
 };
 
+struct DecimatedMesh {
+  TileMesh mesh;
+  std::vector<DecimatedStep> steps;  ///< of the mesh's steps
+};
+
+/// A mesh of several triangulations, each with fewer triangles than the one before, the finest within `tolerance`.
 /// `normals` and `heights` are the tile's kGridSide^2 points row by row, `parent_heights` what the parent level shows there.
 DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey& key,
                              std::span<const geo::Vector<geo::Ecef>> normals, std::span<const double> heights,
-                             std::span<const double> parent_heights, const MeshTolerance& tolerance);
+                             std::span<const double> parent_heights, const MeshTolerance& tolerance,
+                             const MeshLimits& limits = {});
 
 }  // namespace tellurion::surface

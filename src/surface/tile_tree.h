@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -30,6 +31,7 @@ struct SelectionSettings {
   LodMetric metric = LodMetric::screen_space_error;
   double anisotropy = 1.0;        ///< of the texture filter in use
   std::size_t max_tiles = 2000;   ///< selected tiles at most: else the wanted error rises, by a rule of camera and facts alone
+  std::size_t max_bytes = std::numeric_limits<std::size_t>::max();  ///< of graphics memory for them, likewise (see bytes_of_tile)
   bool transitions = false;       ///< fade and morph at level changes; off: always the end state
   bool frozen = false;            ///< keep the cut of the last frame (drawn from the given camera)
 };
@@ -38,7 +40,6 @@ struct TileRequest {
   geo::TileKey key;
   Part part = Part::geometry;
   double gain_px = 0;             ///< screen error that it takes away; requests are sorted by it, greatest first
-  double parent_error = 0;        ///< of the parent's heights, metres: a tile need not be better than a share of that
 };
 
 struct SelectionStats {
@@ -49,7 +50,7 @@ struct SelectionStats {
   std::vector<int> selected_by_level;
   std::vector<int> drawn_by_level;
   double max_error_px = 0;        ///< largest error of a drawn tile
-  double effective_sse_px = 0;    ///< the wanted error after the rule of max_tiles
+  double effective_sse_px = 0;    ///< the wanted error after the rule of max_tiles and max_bytes
   bool complete = false;          ///< the drawn cut is the selected cut with all its parts, and no transition is under way
 };
 
@@ -58,6 +59,9 @@ struct Selection {
   std::vector<TileRequest> requests;  ///< not yet started, at most a few hundred
   SelectionStats stats;
 };
+
+/// About what a tile takes on the GPU: a middling mesh, and the slots of its own that its facts tell of, colour with mips.
+std::size_t bytes_of_tile(const TileFacts& facts);
 
 class TileTree {
  public:

@@ -49,7 +49,8 @@ inline surface::TileGeometry exact_geometry(const geo::Ellipsoid& ellipsoid, con
       for (const int i : {a, b, a + 1, a + 1, b, b + 1}) mesh.indices.push_back(static_cast<std::uint16_t>(i));
     }
   }
-  mesh.surface_index_count = static_cast<std::uint32_t>(mesh.indices.size());
+  const auto count = static_cast<std::uint32_t>(mesh.indices.size());
+  mesh.steps = {{0, count, count}};
   const double step = 1e-3;
   const auto along = geo::tile_normal(key, {0.5 + step, 0.5}) - geo::tile_normal(key, {0.5 - step, 0.5});
   geometry.slopes.tangent = {glm::normalize(along.xyz)};

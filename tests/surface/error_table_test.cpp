@@ -107,11 +107,12 @@ TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, 
       REQUIRE(truth[i] >= static_cast<double>(known.min_height));
       REQUIRE(truth[i] <= static_cast<double>(known.max_height));
     }
-    CHECK(largest <= static_cast<double>(*known.height_error));
-    ratios.push_back(static_cast<double>(*known.height_error) / std::max(largest, 1e-3));
+    CHECK(largest <= static_cast<double>(known.height_error->bound));
+    ratios.push_back(static_cast<double>(known.height_error->bound) / std::max(largest, 1e-3));
     if (key.level > 0) {
       const TileFacts above = facts->facts_of(geo::parent(key));
-      CHECK(*above.height_error >= *known.height_error);
+      CHECK(above.height_error->bound >= known.height_error->bound);
+      CHECK(above.height_error->common >= known.height_error->common);
       CHECK(above.min_height <= known.min_height);
       CHECK(above.max_height >= known.max_height);
     }
@@ -209,15 +210,15 @@ TEST_CASE("make_facts: without a table, safe assumptions that shrink with the le
     CHECK(known.max_height >= 9000);
     if (known.height_error) {
       CHECK(!ended);
-      CHECK(*known.height_error < before);
-      before = *known.height_error;
+      CHECK(known.height_error->bound < before);
+      before = known.height_error->bound;
     } else {
       ended = true;
       CHECK(nominal_grid_spacing(geo::kWgs84, level) <= 1.5 * description->heights[0].source->description().spacing.value);
     }
   }
   CHECK(ended);
-  CHECK(facts->facts_of(geo::TileKey{2, 4, 1, 1}).height_error == 0.0f);  // where there is nothing
+  CHECK(facts->facts_of(geo::TileKey{2, 4, 1, 1}).height_error == HeightError{});  // where there is nothing
 }
 
 TEST_CASE("make_facts: imagery asks for slots down to where its pixels are a texel, and no further") {

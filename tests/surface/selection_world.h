@@ -45,15 +45,24 @@ struct EvenPlanet : SurfaceFacts {
     TileMetrics metrics;
     metrics.min_height = static_cast<float>(-relief * std::exp2(-0.5 * key.level) * 0.9);
     metrics.max_height = static_cast<float>(relief * std::exp2(-0.5 * key.level) * 0.9);
-    metrics.height_error = error_of(key.level);
-    metrics.curvature_error = static_cast<float>(full_grid_curvature_error(ellipsoid, tile_shape(ellipsoid, key)));
+    const float curvature = full_grid_curvature_error(ellipsoid, tile_shape(ellipsoid, key));
+    metrics.step_count = 3;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const float coarser = std::exp2(static_cast<float>(i) / 2);
+      const HeightError finest = error_of(key.level);
+      metrics.steps[i] = {{finest.bound * coarser, finest.common * coarser}, curvature * coarser};
+    }
     return metrics;
   }
 
   bool has_slopes(const geo::TileKey& key) const { return facts_of(key).own_slopes && (key.x ^ key.y) % 5 != 0; }
 
  private:
-  float error_of(int level) const { return static_cast<float>(root_error * std::exp2(-level)); }
+  /// Now what is common decides, now the bound.
+  HeightError error_of(int level) const {
+    const auto bound = static_cast<float>(root_error * std::exp2(-level));
+    return {bound, level % 3 == 0 ? 0.1f * bound : 0.8f * bound};
+  }
 };
 
 /// Brings what the tree asks for, a few parts a frame, in any order, and fails now and then.

@@ -59,7 +59,7 @@ geo::TileKey random_key(std::mt19937_64& random, int level, int kind) {
 }
 
 struct FlatFacts : SurfaceFacts {
-  std::optional<float> error;
+  std::optional<HeightError> error;
   bool slopes = false;
   TileFacts facts_of(const geo::TileKey&) const override {
     TileFacts facts;
@@ -114,7 +114,9 @@ TEST_CASE("make_tile_mesh: triangles face outward, the skirt hangs from every bo
     std::vector<double> heights;
     std::transform(normals.begin(), normals.end(), std::back_inserter(heights), terrain);
     const double size = nominal_tile_size(geo::kWgs84, key.level);
-    const TileMesh mesh = make_tile_mesh(geo::kWgs84, key, normals, heights, heights, {size / 500, size / 500}).mesh;
+    MeshLimits one;
+    one.most_steps = 1;
+    const TileMesh mesh = make_tile_mesh(geo::kWgs84, key, normals, heights, heights, {size / 500, size / 500}, one).mesh;
     const auto position = [&](std::uint16_t i) {
       const TileVertex& v = mesh.vertices[i];
       return shown(mesh, v) - static_cast<double>(v.skirt) * size / 10 * (mesh.origin_up.xyz + glm::dvec3(v.up_offset));
@@ -124,7 +126,7 @@ TEST_CASE("make_tile_mesh: triangles face outward, the skirt hangs from every bo
     for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
       const std::uint16_t a = mesh.indices[i], b = mesh.indices[i + 1], c = mesh.indices[i + 2];
       const glm::dvec3 front = glm::cross(position(b) - position(a), position(c) - position(a));
-      if (i < mesh.surface_index_count) {
+      if (i < mesh.steps.front().surface_index_count) {
         REQUIRE(glm::dot(front, mesh.origin_up.xyz) > 0);
         REQUIRE(mesh.vertices[a].skirt + mesh.vertices[b].skirt + mesh.vertices[c].skirt == 0.0f);
       } else {
@@ -159,7 +161,7 @@ TEST_CASE("make_tile_mesh: the deviations it reports are those of the drawn tria
     std::uniform_real_distribution<double> share(0, 1);
     double largest = 0, largest_without_heights = 0;
     for (int i = 0; i < 20000; ++i) {
-      const std::size_t t = random() % (built.mesh.surface_index_count / 3) * 3;
+      const std::size_t t = random() % (built.mesh.steps.front().surface_index_count / 3) * 3;
       double l1 = share(random), l2 = share(random);
       if (l1 + l2 > 1) l1 = 1 - l1, l2 = 1 - l2;
       glm::dvec3 point(0), bare(0);
@@ -176,11 +178,11 @@ TEST_CASE("make_tile_mesh: the deviations it reports are those of the drawn tria
       largest = std::max(largest, std::abs(seen.height.value - interpolate_in_triangles(heights, kGridSide, at.x, at.y)));
       largest_without_heights = std::max(largest_without_heights, -geo::to_geodetic(geo::kWgs84, {bare}).height.value);
     }
-    CHECK(largest_without_heights <= built.curvature_deviation * 1.0001 + 1e-7);
-    CHECK(largest_without_heights > 0.5 * built.curvature_deviation - 1e-7);
-    CHECK(largest <= built.height_deviation + built.curvature_deviation * 1.01 + 1e-6);
-    if (level <= 5) CHECK(built.curvature_deviation <= 1.5 * std::max(tolerance.curvature, size * size / (kGridSide - 1) / (kGridSide - 1) / 4 / 6.3e6));
-    CHECK(built.height_deviation <= tolerance.height + 0.05 * built.curvature_deviation + 1e-9);
+    CHECK(largest_without_heights <= built.steps.front().curvature_deviation * 1.0001 + 1e-7);
+    CHECK(largest_without_heights > 0.5 * built.steps.front().curvature_deviation - 1e-7);
+    CHECK(largest <= built.steps.front().height_deviation + built.steps.front().curvature_deviation * 1.01 + 1e-6);
+    if (level <= 5) CHECK(built.steps.front().curvature_deviation <= 1.5 * std::max(tolerance.curvature, size * size / (kGridSide - 1) / (kGridSide - 1) / 4 / 6.3e6));
+    CHECK(built.steps.front().height_deviation <= tolerance.height + 0.05 * built.steps.front().curvature_deviation + 1e-9);
   }
 }
 
@@ -212,8 +214,8 @@ TEST_CASE("error_between_samples: bounds the deviation of grids finer than their
         largest = std::max(largest, std::abs(truth[static_cast<std::size_t>(y * kDense + x)] - grid));
       }
     }
-    REQUIRE(largest <= field.error);
-    ratios.push_back(field.error / largest);
+    REQUIRE(largest <= static_cast<double>(field.error.bound));
+    ratios.push_back(static_cast<double>(field.error.bound) / largest);
   }
   std::nth_element(ratios.begin(), ratios.begin() + 30, ratios.end());
   CHECK(ratios[30] < 3);
@@ -233,11 +235,11 @@ TEST_CASE("build_geometry: tells the truth about its heights, in levels above an
     key.face %= 4;
     key.y = static_cast<std::uint32_t>((1u << level) / 4 + key.y / 2);
     CAPTURE(geo::to_string(key));
-    const TileGeometry built = std::move(build_geometry(*world.model, facts, key, 0.0)).value();
+    const TileGeometry built = std::move(build_geometry(*world.model, facts, key)).value();
     double largest = 0, lowest = 1e9, highest = -1e9;
     std::uniform_real_distribution<double> share(0, 1);
     for (int i = 0; i < 20000; ++i) {
-      const std::size_t t = random() % (built.mesh.surface_index_count / 3) * 3;
+      const std::size_t t = random() % (built.mesh.steps.front().surface_index_count / 3) * 3;
       double l1 = share(random), l2 = share(random);
       if (l1 + l2 > 1) l1 = 1 - l1, l2 = 1 - l2;
       glm::dvec3 point(0);
@@ -248,8 +250,9 @@ TEST_CASE("build_geometry: tells the truth about its heights, in levels above an
       largest = std::max(largest, std::abs(seen.height.value - truth));
       lowest = std::min(lowest, truth), highest = std::max(highest, truth);
     }
-    CHECK(largest <= static_cast<double>(built.metrics.height_error + built.metrics.curvature_error) * 1.001);
-    CHECK(largest >= 0.1 * static_cast<double>(built.metrics.height_error));
+    const MeshError& finest = built.metrics.steps.front();
+    CHECK(largest <= static_cast<double>(finest.height.bound + finest.curvature) * 1.001);
+    CHECK(largest >= 0.1 * static_cast<double>(finest.height.bound));
     CHECK(lowest >= static_cast<double>(built.metrics.min_height));
     CHECK(highest <= static_cast<double>(built.metrics.max_height));
   }
@@ -261,12 +264,12 @@ TEST_CASE("build_geometry: a child's parent heights are what its parent shows, a
   rough.metres = [](int x, int y) { return noise(x, y, 7, 0, 3000); };
   MadeWorld world({layer_of(rough, 1)});
   FlatFacts facts;
-  facts.error = 500.0f;
+  facts.error = HeightError{500.0f, 500.0f};
   const geo::TileKey parent{1, 5, 9, 17};
-  const HeightField field = std::move(field_of_known_error(*world.model, parent, 500)).value();
+  const HeightField field = std::move(field_of_known_error(*world.model, parent, {500, 500})).value();
   constexpr double kHalf = (kGridSide - 1) / 2.0;
   for (int i = 0; i < 4; ++i) {
-    const TileMesh mesh = std::move(build_geometry(*world.model, facts, geo::child(parent, i), 0.0, {0.01, 0.0, 1e-6})).value().mesh;
+    const TileMesh mesh = std::move(build_geometry(*world.model, facts, geo::child(parent, i), {0.0, 1e-6, {}})).value().mesh;
     REQUIRE(mesh.vertices.size() > 2000);
     for (const TileVertex& v : mesh.vertices) {
       const double x = (static_cast<double>(v.st.x) + (i & 1)) * kHalf, y = (static_cast<double>(v.st.y) + (i >> 1)) * kHalf;
@@ -306,7 +309,7 @@ TEST_CASE("build_geometry: gives up when asked to") {
   MadeWorld world({});
   std::stop_source stop;
   stop.request_stop();
-  const auto built = build_geometry(*world.model, FlatFacts(), {0, 3, 1, 1}, 0.0, {}, stop.get_token());
+  const auto built = build_geometry(*world.model, FlatFacts(), {0, 3, 1, 1}, {}, stop.get_token());
   REQUIRE(!built);
   CHECK(built.error().code == ErrorCode::cancelled);
 }

@@ -16,9 +16,9 @@ TEST_CASE("next_life: a part is fetched, arrives and is released") {
   life = next_life(life, Start{});
   CHECK(std::holds_alternative<Fetching>(life));
   CHECK_FALSE(can_request(life, {}));
-  life = next_life(life, Arrive{{{-1, 2, 3, 4}, true}});
+  life = next_life(life, Arrive{{{-1, 3, {}, 1}, true}});
   REQUIRE(std::holds_alternative<Resident>(life));
-  CHECK(std::get<Resident>(life).metrics.height_error == 3);
+  CHECK(std::get<Resident>(life).metrics.max_height == 3);
   CHECK(std::get<Resident>(life).has_slopes);
   CHECK(std::holds_alternative<Wanted>(next_life(life, Release{})));
 }
@@ -40,6 +40,6 @@ TEST_CASE("next_life: what is resident stays until it is released, whatever a ne
   for (const PartEvent& event : {PartEvent(Start{}), PartEvent(Cancel{}), PartEvent(Fail{kRetry})}) {
     CHECK(std::holds_alternative<Resident>(next_life(Resident{}, event)));
   }
-  const PartLife renewed = next_life(Resident{{0, 0, 1, 0}, false}, Arrive{{{0, 0, 2, 0}, false}});
-  CHECK(std::get<Resident>(renewed).metrics.height_error == 2);
+  const PartLife renewed = next_life(Resident{{0, 1, {}, 1}, false}, Arrive{{{0, 2, {}, 1}, false}});
+  CHECK(std::get<Resident>(renewed).metrics.max_height == 2);
 }

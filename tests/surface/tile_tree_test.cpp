@@ -49,9 +49,10 @@ class ReferenceCut {
     const TileShape shape = tile_shape(planet_.ellipsoid, key);
     const double a = planet_.ellipsoid.a();
     const auto geometric = [&](double height, double curve, double top) { return height * x + curve * (1 + x * top / a); };
+    const auto height_of = [](const HeightError& e) { return std::max(static_cast<double>(e.common), static_cast<double>(e.bound) / 2); };
     const double sag = shape.grid_diagonal * shape.grid_diagonal / 8 * a / (planet_.ellipsoid.b() * planet_.ellipsoid.b());
-    double metres = std::max(4e-7 * shape.size, geometric(built.height_error, built.curvature_error, built.max_height));
-    if (tabled) metres = std::max(metres, geometric(*facts.height_error, sag, facts.max_height));
+    double metres = std::max(4e-7 * shape.size, geometric(height_of(built.steps[0].height), built.steps[0].curvature, built.max_height));
+    if (tabled) metres = std::max(metres, geometric(height_of(*facts.height_error), sag, facts.max_height));
     const double pixel = std::max(distance_to(box, camera_.eye.xyz), 0.1) * camera_.pixel_angle();
     double error = metres / pixel;
     if (facts.finer_colour_below) {
@@ -98,7 +99,7 @@ std::string text_of(const Selection& selection) {
   for (const DrawTile& tile : selection.draw) {
     text += geo::to_string(tile.key) + ' ' + geo::to_string(tile.colour_owner) + ' ' + geo::to_string(tile.slope_owner) + ' ' +
             std::to_string(tile.fade) + ' ' + std::to_string(tile.morph) + ' ' + std::to_string(tile.skirt_depth) + ' ' +
-            std::to_string(tile.error_px) + ' ' + std::to_string(tile.distance) + '\n';
+            std::to_string(tile.error_px) + ' ' + std::to_string(tile.distance) + ' ' + std::to_string(tile.step) + '\n';
   }
   return text;
 }
@@ -201,6 +202,34 @@ TEST_CASE("select: a finished picture does not depend on the way there") {
   }
 }
 
+TEST_CASE("select: a tile is drawn by its coarsest triangulation that is good enough") {
+  std::mt19937_64 random(7);
+  std::array<int, 3> drawn{};
+  for (int i = 0; i < 20; ++i) {
+    EvenPlanet planet;
+    planet.colour_level = 10;
+    SelectionSettings settings;
+    const view::Camera camera = random_camera(planet.ellipsoid, random, 3000);
+    Flight flight(planet, random());
+    const Selection* selection = flight.finish(camera, settings);
+    REQUIRE(selection != nullptr);
+    for (const DrawTile& tile : selection->draw) {
+      const TileMetrics metrics = planet.metrics_of(tile.key);
+      const auto px = [&](std::size_t step) {
+        const MeshError& e = metrics.steps[step];
+        const double raised = 1 + static_cast<double>(metrics.max_height) / planet.ellipsoid.a();
+        const double height = std::max(static_cast<double>(e.height.common), static_cast<double>(e.height.bound) / 2);
+        return (height + static_cast<double>(e.curvature) * raised) / (tile.distance * camera.pixel_angle());
+      };
+      ++drawn[tile.step];
+      if (tile.step > 0) CHECK(px(tile.step) <= settings.sse_px);
+      if (tile.step < 2) CHECK(px(tile.step + 1u) > settings.sse_px);
+      CHECK(static_cast<double>(tile.error_px) >= px(tile.step) * 0.999);
+    }
+  }
+  for (const int count : drawn) CHECK(count > 0);
+}
+
 TEST_CASE("select: the wanted error rises by the least step that keeps to max_tiles") {
   const std::uint64_t seed = 123;
   CAPTURE(seed);
@@ -260,17 +289,17 @@ TEST_CASE("select: skirts reach below what neighbours can deviate by, and stay s
     settings.exaggeration = i % 2 == 0 ? 1 : 10;
     const view::Camera camera = random_camera(planet.ellipsoid, random, 3000);
     Flight flight(planet, random());
-    const auto error_of = [&](const geo::TileKey& key) {
-      const TileMetrics m = planet.metrics_of(key);
-      return m.height_error * settings.exaggeration + m.curvature_error;
+    const auto error_of = [&](const DrawTile& tile) {
+      const MeshError m = planet.metrics_of(tile.key).steps[tile.step];
+      return static_cast<double>(m.height.bound) * settings.exaggeration + static_cast<double>(m.curvature);
     };
     for (int frame = 0; frame < 30; ++frame) {  // in mid-load, where neighbours differ most
       const Selection& selection = flight.frame(camera, settings, 15, 10);
       double largest = 0;
-      for (const DrawTile& tile : selection.draw) largest = std::max(largest, error_of(tile.key));
+      for (const DrawTile& tile : selection.draw) largest = std::max(largest, error_of(tile));
       for (const DrawTile& tile : selection.draw) {
         CHECK(tile.skirt_depth > 0);
-        const double own = error_of(tile.key) + 2 * camera.pixel_angle() * tile.distance;
+        const double own = error_of(tile) + 2 * camera.pixel_angle() * tile.distance;
         CHECK(tile.skirt_depth < (own + largest) * 1.1 + 1);
         for (const geo::Side side : {geo::Side::north, geo::Side::east, geo::Side::south, geo::Side::west}) {
           const geo::TileKey beyond = geo::neighbour(tile.key, side);
@@ -285,7 +314,7 @@ TEST_CASE("select: skirts reach below what neighbours can deviate by, and stay s
             if (!touches) continue;
             ++borders;
             uneven += other.key.level != tile.key.level ? 1 : 0;
-            CHECK(tile.skirt_depth >= (own + error_of(other.key)) * 0.999);
+            CHECK(tile.skirt_depth >= (own + error_of(other)) * 0.999);
           }
         }
       }
