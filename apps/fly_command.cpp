@@ -133,10 +133,10 @@ void add_fly(CLI::App& app, Run& run) {
   command->add_option("WORLD FLIGHT", *words, "the world (default: the embedded Earth) and the flight: a CSV with the header "
                       "time,lat,lon,height,heading,pitch,roll")->required()->expected(1, 2)->type_name("");
   command->add_option("--out", options->out, "a folder for numbered PNGs, or a video")->required()->type_name("DIR|FILE.mp4");
-  command->add_option("--fps", options->frames_per_second, "frames a second (30)")->check(CLI::Range(0.001, 1000.0))->type_name("N");
+  command->add_option("--fps", options->frames_per_second, "frames a second (30)")->check(in_range(0.001, 1000.0))->type_name("N");
   command->add_option("--clock-rate", options->clock_rate, "how fast the world's time runs (1)")->type_name("R");
   command->add_flag("--realtime", options->realtime, "by the wall clock, finished or not");
-  command->add_option("--timeout", options->timeout_seconds, "for each frame to load (120)")->check(CLI::Range(0.0, 1e6))->type_name("S");
+  command->add_option("--timeout", options->timeout_seconds, "for each frame to load (120)")->check(in_range(0.0, 1e6))->type_name("S");
   command->add_option("--stats", options->stats_file, "write the flight's figures")->type_name("FILE.json");
   command->add_option("--trace", options->trace_file, "write the figures of every frame")->type_name("FILE.csv");
   add_view_options(*command, *options);

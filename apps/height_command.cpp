@@ -66,7 +66,7 @@ void add_height(CLI::App& app, Run& run) {
   CLI::App* command = app.add_subcommand("height", "heights of places: \"lat lon\" a line in, \"lat lon height level\" out, metres");
   add_world(*command, *options, false);
   command->add_flag("--nearest", *nearest, "the nearest sample instead of bilinear");
-  command->add_option("--spacing", *spacing, "answer from samples about this far apart (default: the finest)")->check(CLI::Range(0.0, 1e8))->type_name("M");
+  command->add_option("--spacing", *spacing, "answer from samples about this far apart (default: the finest)")->check(in_range(0.0, 1e8))->type_name("M");
   add_resource_options(*command, *options);
   command->callback([=, &run] {
     run = [=] { return heights(*options, *nearest ? globe::HeightLookup::nearest : globe::HeightLookup::bilinear, *spacing); };

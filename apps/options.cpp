@@ -52,6 +52,15 @@ CLI::Option* add_text(CLI::App& app, const std::string& name, std::function<void
 
 }  // namespace
 
+CLI::Validator in_range(double least, double most) {
+  const auto check = [least, most](const std::string& text) {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && value >= least && value <= most;
+    return good ? std::string() : fmt::format("\"{}\" is not a number from {} to {}", text, least, most);
+  };
+  return CLI::Validator(check, fmt::format("{} to {}", least, most));
+}
+
 void add_world(CLI::App& app, Options& options, bool required) {
   auto* world = app.add_option("WORLD", options.world, "a world file (TOML) or any raster that GDAL opens; default: the embedded Earth");
   world->type_name("");
@@ -70,9 +79,9 @@ void add_camera(CLI::App& app, Options& options) {
 void add_view_options(CLI::App& app, Options& options) {
   globe::ViewSettings& view = options.view;
   add_text(app, "--size", [&options](const std::string& t) { set_size(t, options); }, "picture size in pixels (1280x720)", "WxH");
-  app.add_option("--vfov", options.vertical_fov_degrees, "vertical field of view")->check(CLI::Range(0.01, 170.0))->type_name("DEG");
-  app.add_option("--sse", view.sse_px, "wanted screen-space error")->check(CLI::Range(0.05, 1000.0))->type_name("PX");
-  app.add_option("--exaggeration", view.exaggeration, "vertical exaggeration")->check(CLI::Range(0.0, 1000.0))->type_name("E");
+  app.add_option("--vfov", options.vertical_fov_degrees, "vertical field of view")->check(in_range(0.01, 170.0))->type_name("DEG");
+  app.add_option("--sse", view.sse_px, "wanted screen-space error")->check(in_range(0.05, 1000.0))->type_name("PX");
+  app.add_option("--exaggeration", view.exaggeration, "vertical exaggeration")->check(in_range(0.0, 1000.0))->type_name("E");
   add_text(app, "--time", [&view](const std::string& text) {
     const auto time = parse_utc(text);
     if (!time) throw CLI::ValidationError("--time", time.error().message);
@@ -90,7 +99,7 @@ void add_view_options(CLI::App& app, Options& options) {
   app.add_flag("--bounds", view.bounds, "the tiles' bounding boxes");
   app.add_flag("--tile-borders", view.tile_borders, "the tiles' borders");
   app.add_flag("--antialias", view.antialiasing, "smooth edges with 4 samples a pixel");
-  app.add_option("--anisotropy", view.anisotropy, "of the texture filter")->check(CLI::Range(1.0, 16.0))->type_name("N");
+  app.add_option("--anisotropy", view.anisotropy, "of the texture filter")->check(in_range(1.0, 16.0))->type_name("N");
   add_text(app, "--clear", [&view](const std::string& t) { set_colour(t, view.clear); }, "colour of the empty sky (000000)", "RRGGBB");
   add_text(app, "--gl", [&options](const std::string& text) {
     if (text != "core" && text != "es") throw CLI::ValidationError("--gl", fmt::format("\"{}\" is not one of core, es", text));

@@ -11,6 +11,7 @@
 
 namespace CLI {
 class App;
+class Validator;
 }
 
 namespace tellurion::apps {
@@ -39,6 +40,9 @@ struct Options {
   std::filesystem::path trace_file;
   std::filesystem::path geo_file;
 };
+
+/// Accepts numbers from `least` to `most`; not a number is none.
+CLI::Validator in_range(double least, double most);
 
 /// WORLD, as the first word that is no option.
 void add_world(CLI::App& app, Options& options, bool required);

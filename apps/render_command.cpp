@@ -93,8 +93,8 @@ void add_render(CLI::App& app, Run& run) {
   add_camera(*command, *options);
   add_view_options(*command, *options);
   add_resource_options(*command, *options);
-  command->add_option("--timeout", options->timeout_seconds, "give up loading after this time (120)")->check(CLI::Range(0.0, 1e6))->type_name("S");
-  command->add_option("--after", options->after_ms, "the picture as it is after this time, loading or not")->check(CLI::Range(0.0, 1e9))->type_name("MS");
+  command->add_option("--timeout", options->timeout_seconds, "give up loading after this time (120)")->check(in_range(0.0, 1e6))->type_name("S");
+  command->add_option("--after", options->after_ms, "the picture as it is after this time, loading or not")->check(in_range(0.0, 1e9))->type_name("MS");
   command->add_option("--stats", options->stats_file, "write the picture's figures")->type_name("FILE.json");
   command->add_option("--trace", options->trace_file, "write the figures of every frame")->type_name("FILE.csv");
   command->add_option("--geo", options->geo_file, "write what the picture shows: latitude, longitude, height, distance")->type_name("FILE.tif");

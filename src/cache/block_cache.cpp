@@ -59,6 +59,7 @@ struct BlockCache::State {
   std::list<Entry> entries;  ///< the most recently used first
   std::unordered_map<Name, std::list<Entry>::iterator, NameHash> index;
   std::unordered_map<Name, std::shared_ptr<Flight>, NameHash> flights;
+  std::unordered_map<std::uint32_t, SourceReads> reads;
 };
 
 template <class Data, class Decode>
@@ -88,9 +89,16 @@ Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const D
   lock.lock();
   flight->outcome = std::move(outcome);
   flights.erase(name);
+  SourceReads& done = reads[name.key.source];
   if (flight->outcome->has_value()) {
     const Block& block = flight->outcome->value();
-    keep(name, block, sizeof(Entry) + std::get<Frozen<Data>>(block)->bytes());
+    const std::size_t block_bytes = std::get<Frozen<Data>>(block)->bytes();
+    ++done.blocks;
+    done.bytes += static_cast<std::int64_t>(block_bytes);
+    keep(name, block, sizeof(Entry) + block_bytes);
+  } else if (const Error& error = flight->outcome->error(); error.code != ErrorCode::cancelled) {
+    ++done.errors;
+    done.last_error = error.message;
   }
   lock.unlock();
   landed.notify_all();
@@ -117,6 +125,12 @@ Result<Frozen<raster::HeightGrid>> BlockCache::heights(const BlockKey& key, cons
 
 Result<Frozen<raster::Image>> BlockCache::image(const BlockKey& key, const DecodeImage& decode) {
   return state_->find_or_decode<raster::Image>(Name{key, true}, decode);
+}
+
+SourceReads BlockCache::reads_of(std::uint32_t source) const {
+  std::lock_guard lock(state_->mutex);
+  const auto found = state_->reads.find(source);
+  return found != state_->reads.end() ? found->second : SourceReads{};
 }
 
 std::size_t BlockCache::bytes() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "base/frozen.h"
 #include "base/result.h"
@@ -26,6 +27,14 @@ struct BlockKey {
   friend bool operator==(const BlockKey&, const BlockKey&) = default;
 };
 
+/// What was decoded for a source since the start, and what could not be.
+struct SourceReads {
+  std::int64_t blocks = 0;
+  std::int64_t bytes = 0;  ///< as decoded
+  std::int64_t errors = 0;
+  std::string last_error;
+};
+
 /// Least recently used first; holds at most the budget plus one block.
 class BlockCache {
  public:
@@ -40,6 +49,8 @@ class BlockCache {
   /// The block, decoded by `decode` if it is not there. An error is passed on and not kept.
   Result<Frozen<raster::HeightGrid>> heights(const BlockKey& key, const DecodeHeights& decode);
   Result<Frozen<raster::Image>> image(const BlockKey& key, const DecodeImage& decode);
+
+  SourceReads reads_of(std::uint32_t source) const;
 
   std::size_t bytes() const;
   std::size_t budget_bytes() const;

@@ -40,8 +40,8 @@ struct FrameStats {
 /// What a source did so far.
 struct SourceStats {
   std::string name;
-  std::int64_t requests = 0;
-  std::int64_t bytes = 0;
+  std::int64_t requests = 0;  ///< blocks of samples asked of it
+  std::int64_t bytes = 0;     ///< decoded
   std::int64_t errors = 0;
   std::string last_error;
 };

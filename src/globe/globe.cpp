@@ -72,7 +72,6 @@ struct Globe::State {
   mutable std::mutex mutex;  ///< guards what follows
   std::shared_ptr<const surface::SurfaceFacts> facts;
   std::vector<SourceStats> sources;
-  bool missing = false;
 
   std::vector<std::unique_ptr<SurfaceWorker>> workers;
   std::unique_ptr<HeightTables> tables;
@@ -106,7 +105,6 @@ void Globe::State::open_layers() {
         stats.errors = 1;
         stats.last_error = source.error().message;
         info.error = source.error().message;
-        missing = true;
       }
     }
     layers.push_back(std::move(info));
@@ -137,7 +135,7 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
                                               std::lock_guard lock(s.mutex);
                                               s.facts = std::move(facts);
                                             });
-  s.tables->start(options.scan_heights);
+  s.tables->load(options.scan_heights);
   return globe;
 }
 
@@ -157,13 +155,20 @@ std::vector<std::string> Globe::hints() const {
 }
 
 std::vector<SourceStats> Globe::source_stats() const {
-  std::lock_guard lock(state_->mutex);
-  return state_->sources;
+  std::vector<SourceStats> all = state_->sources;
+  for (std::size_t id = 0; id < all.size(); ++id) {
+    cache::SourceReads reads = state_->blocks.reads_of(static_cast<std::uint32_t>(id));
+    all[id].requests = reads.blocks + reads.errors;
+    all[id].bytes = reads.bytes;
+    all[id].errors += reads.errors;
+    if (reads.errors > 0) all[id].last_error = std::move(reads.last_error);
+  }
+  return all;
 }
 
 bool Globe::data_missing() const {
-  std::lock_guard lock(state_->mutex);
-  return state_->missing;
+  const std::vector<SourceStats> all = source_stats();
+  return std::any_of(all.begin(), all.end(), [](const SourceStats& source) { return source.errors > 0; });
 }
 
 std::size_t Globe::memory_cache_bytes() const { return state_->blocks.bytes() + source::gdal_cache_bytes(); }
@@ -195,7 +200,10 @@ view::Pose Globe::home() const {
 
 bool Globe::tables_ready() const { return state_->tables->ready(); }
 
+void Globe::begin_tables() { state_->tables->begin_scan(); }
+
 bool Globe::wait_for_tables(std::chrono::steady_clock::time_point deadline) {
+  begin_tables();
   while (!tables_ready()) {
     if (std::chrono::steady_clock::now() >= deadline) return false;
     if (!run_one()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -217,21 +225,6 @@ bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) {
 
 bool Globe::run_one() { return state_->pool->run_one(); }
 int Globe::worker_count() const { return state_->pool->worker_count(); }
-
-void Globe::note_requests(std::span<const std::uint32_t> source_ids) {
-  std::lock_guard lock(state_->mutex);
-  for (const std::uint32_t id : source_ids) ++state_->sources[id].requests;
-}
-
-void Globe::note_error(std::string_view layer, const Error& error) {
-  std::lock_guard lock(state_->mutex);
-  state_->missing = true;
-  for (SourceStats& source : state_->sources) {
-    if (source.name != layer) continue;
-    ++source.errors;
-    source.last_error = error.message;
-  }
-}
 
 // --- Heights ---------------------------------------------------------------------------------------------------------
 

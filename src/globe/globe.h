@@ -94,6 +94,8 @@ class Globe {
 
   /// Error tables of the height sources: made in the background, kept in the cache folder.
   bool tables_ready() const;
+  /// Begins to make them; the first view does, once it has its coarsest tiles.
+  void begin_tables();
   /// Waits for them (without threads: makes them here). False if `deadline` came first.
   bool wait_for_tables(std::chrono::steady_clock::time_point deadline);
 
@@ -107,8 +109,6 @@ class Globe {
   /// Without threads: runs a waiting job. False if there is none, or there are threads.
   bool run_one();
   int worker_count() const;
-  void note_requests(std::span<const std::uint32_t> source_ids);
-  void note_error(std::string_view layer, const Error& error);
 
  private:
   struct State;

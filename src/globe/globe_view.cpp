@@ -95,6 +95,8 @@ struct GlobeView::State {
   std::shared_ptr<GroundAnswer> ground = std::make_shared<GroundAnswer>();
   std::stop_source stop;
   int in_flight = 0;
+  int roots_to_renew = 0;   ///< whose geometry was built by older facts and has not been asked for again
+  int roots_renewing = 0;
   int max_in_flight = 0;
   std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
@@ -104,6 +106,7 @@ struct GlobeView::State {
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
   void ask(const surface::TileRequest& request);
   bool submit(const geo::TileKey& key, Part part);
+  void renew_roots();
   void take_over(double upload_ms);
   void take_over(Finished item);
   Result<void> upload(const Finished& item);
@@ -127,6 +130,15 @@ bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
     }
     queue->push(std::move(item));
   });
+}
+
+/// The roots are never asked for again, but must not depend on when the tables came.
+void GlobeView::State::renew_roots() {
+  while (roots_to_renew > 0 && submit({static_cast<std::uint8_t>(roots_to_renew - 1), 0, 0, 0}, Part::geometry)) {
+    --roots_to_renew;
+    ++roots_renewing;
+    ++in_flight;
+  }
 }
 
 void GlobeView::State::ask(const surface::TileRequest& request) {
@@ -159,6 +171,7 @@ Result<void> GlobeView::State::upload(const Finished& item) {
 
 void GlobeView::State::take_over(Finished item) {
   --in_flight;
+  if (item.key.level == 0 && item.part == Part::geometry && roots_renewing > 0) --roots_renewing;
   Result<void> result;
   if (const Error* error = std::get_if<Error>(&item.content)) result = *error;
   else result = upload(item);
@@ -199,7 +212,9 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   if (auto latest = globe.facts(); latest != facts) {
     facts = std::move(latest);
     tree.set_facts(facts);
+    roots_to_renew = geo::kFaceCount;
   }
+  renew_roots();
   const auto before_select = Clock::now();
   selection = &tree.select(camera, selection_of(settings, max_bytes), before_select);
   stats.select_ms = ms_since(before_select);
@@ -218,7 +233,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready();
+  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0;
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
@@ -287,11 +302,13 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   auto renderer = render::Renderer::create(thread, options);
   if (!renderer) return renderer.error();
   state->renderer = std::move(*renderer);
-  state->max_bytes = std::max(gpu_budget_bytes, kLeastBytes);
+  // The ancestors of what a picture shows take a third of that again.
+  state->max_bytes = std::max(gpu_budget_bytes / 4 * 3, kLeastBytes);
   state->max_in_flight = std::max(2 * std::max(globe.worker_count(), 1), 4);
   state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
   state->facts = globe.facts();
   if (auto roots = state->load_roots(); !roots) return roots.error();
+  globe.begin_tables();
   return std::unique_ptr<GlobeView>(new GlobeView(std::move(state)));
 }
 
@@ -322,7 +339,8 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;
-    if (s.in_flight == 0 && s.selection->requests.empty()) return false;  // the rest has failed for good
+    const bool idle = s.in_flight == 0 && s.roots_to_renew == 0 && s.selection->requests.empty();
+    if (idle && s.facts == s.globe.facts()) return false;  // the rest has failed for good
     const auto now = Clock::now();
     if (now >= deadline) return false;
     if (s.globe.run_one()) continue;

@@ -36,6 +36,7 @@ struct HeightTables::State {
   std::string revision;
   std::stop_source stop;
   std::atomic<bool> ready{false};
+  std::atomic<bool> begun{false};
 
   std::mutex mutex;  ///< guards what follows
   std::vector<surface::ElevationModel> idle_models;
@@ -113,7 +114,7 @@ HeightTables::HeightTables(std::shared_ptr<const surface::SurfaceDescription> su
 
 HeightTables::~HeightTables() { state_->stop.request_stop(); }
 
-void HeightTables::start(bool scan) {
+void HeightTables::load(bool scan) {
   State& s = *state_;
   if (!s.file.empty()) {
     if (auto kept = surface::ErrorTable::load(s.file, s.revision)) {
@@ -123,10 +124,12 @@ void HeightTables::start(bool scan) {
     }
   }
   s.publish(surface::make_facts(s.surface, nullptr));
-  if (!scan) {
-    s.ready = true;
-    return;
-  }
+  s.ready = !scan;
+}
+
+void HeightTables::begin_scan() {
+  State& s = *state_;
+  if (s.ready || s.begun.exchange(true)) return;
   const std::vector<geo::TileKey> jobs = surface::scan_jobs();
   s.scans.resize(jobs.size());
   s.unfinished = jobs.size();

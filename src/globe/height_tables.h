@@ -23,8 +23,10 @@ class HeightTables {
                std::filesystem::path cache_folder, WorkerPool& pool, Publish publish);
   ~HeightTables();
 
-  /// Loads or begins to make the table; does not wait. With `scan` false the estimates stay.
-  void start(bool scan);
+  /// Loads the table if it was kept. With `scan` false the estimates stay otherwise.
+  void load(bool scan);
+  /// Begins to make the table, once, if it was not kept; does not wait.
+  void begin_scan();
   /// Whether the facts are final.
   bool ready() const;
 

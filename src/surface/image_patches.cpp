@@ -75,8 +75,9 @@ std::optional<WindowChoice> choose_window(const source::RasterDescription& raste
     const glm::dvec2 per_texel = pixels_per_texel * scale;
     const glm::dvec2 size = (high - low) * scale + 4.0;
     if (choice.level < last && (std::min(per_texel.x, per_texel.y) >= 2.0 || size.x * size.y > kLargestRead)) continue;
-    choice.reduction = {power_of_two_within(std::max(per_texel.x, size.x / (kLargestWindow / 2))),
-                        power_of_two_within(std::max(per_texel.y, size.y / (kLargestWindow / 2)))};
+    // A raster can be much smaller than a texel.
+    const glm::dvec2 wanted = glm::min(glm::max(per_texel, size / (kLargestWindow / 2.0)), size);
+    choice.reduction = {power_of_two_within(wanted.x), power_of_two_within(wanted.y)};
     // One pixel, after reduction, round all that is sampled.
     const glm::ivec2 first = glm::ivec2(glm::floor(low * scale - 0.5)) - choice.reduction + 1;
     const glm::ivec2 end = glm::ivec2(glm::ceil(high * scale + 0.5)) + choice.reduction - 1;

@@ -46,11 +46,10 @@ void inherit_owners(Node& node) {
 
 }  // namespace
 
-std::size_t bytes_of_tile(const TileFacts& facts) {
-  constexpr std::size_t kMesh = 96u << 10;
+std::size_t bytes_of_tile(const TileFacts& facts, const TileMetrics& metrics) {
   constexpr std::size_t kSlopes = kSlopeSlotSide * kSlopeSlotSide * 4 * 4 / 3;
   constexpr std::size_t kColour = kColourSlotSide * kColourSlotSide * 4 * 4 / 3;
-  return kMesh + (facts.own_slopes ? kSlopes : 0) + (facts.own_colour ? kColour : 0);
+  return metrics.mesh_bytes + (facts.own_slopes ? kSlopes : 0) + (facts.own_colour ? kColour : 0);
 }
 
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
@@ -143,7 +142,8 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
   node.split = wants_split(frame, node);
   if (!node.split) {
     ++selected_;
-    selected_bytes_ += bytes_of_tile(node.facts);
+    const Resident* geometry = node.resident(Part::geometry);
+    selected_bytes_ += bytes_of_tile(node.facts, geometry != nullptr ? geometry->metrics : TileMetrics());
   } else if (within(frame.settings, kHopelessFactor)) {
     pool_.add_children(node);
     for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);

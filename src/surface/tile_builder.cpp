@@ -92,6 +92,7 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
 
   TileGeometry geometry;
   geometry.mesh = std::move(decimated.mesh);
+  geometry.metrics.mesh_bytes = static_cast<std::uint32_t>(geometry.mesh.bytes());
   geometry.metrics.step_count = static_cast<std::uint8_t>(decimated.steps.size());
   for (std::size_t i = 0; i < decimated.steps.size(); ++i) {
     geometry.metrics.steps[i] = {error_of_step(*field, decimated.steps[i]), static_cast<float>(decimated.steps[i].curvature_deviation)};

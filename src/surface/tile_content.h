@@ -36,6 +36,7 @@ struct TileMetrics {
   float max_height = 0;
   std::array<MeshError, kMostMeshSteps> steps{};  ///< of the mesh's steps, finest first
   std::uint8_t step_count = 1;
+  std::uint32_t mesh_bytes = 96u << 10;
 };
 
 /// One vertex. Position relative to the mesh's origin at exaggeration x, in Ecef axes, where

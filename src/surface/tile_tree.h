@@ -60,8 +60,8 @@ struct Selection {
   SelectionStats stats;
 };
 
-/// About what a tile takes on the GPU: a middling mesh, and the slots of its own that its facts tell of, colour with mips.
-std::size_t bytes_of_tile(const TileFacts& facts);
+/// What a tile takes on the GPU: its mesh, and the slots of its own that its facts tell of, colour with mips.
+std::size_t bytes_of_tile(const TileFacts& facts, const TileMetrics& metrics);
 
 class TileTree {
  public:

@@ -81,7 +81,14 @@ TEST_CASE("BlockCache: an error is passed on and not kept") {
   REQUIRE(!failed);
   CHECK(failed.error().message == "bad block");
   CHECK(cache.bytes() == 0);
+  CHECK(cache.reads_of(column(0).source).errors == 1);
+  CHECK(cache.reads_of(column(0).source).last_error == "bad block");
+  CHECK(cache.reads_of(column(0).source).blocks == 0);
   CHECK(cache.heights(column(0), [] { return block_of(1); }));
+  CHECK(cache.heights(column(0), [] { return block_of(1); }));
+  CHECK(cache.reads_of(column(0).source).blocks == 1);
+  CHECK(cache.reads_of(column(0).source).bytes > 0);
+  CHECK(cache.reads_of(column(0).source + 1).blocks == 0);
 }
 
 TEST_CASE("BlockCache: threads that want the same block wait for one decoding") {

@@ -223,6 +223,19 @@ TEST_CASE("build_imagery: windows have one to two pixels a texel on either axis 
   }
 }
 
+TEST_CASE("build_imagery: a raster far smaller than a texel takes no more room than itself") {
+  MadeRaster spot;
+  spot.width = spot.height = 400;
+  spot.west = 8.5, spot.east = 8.5001, spot.south = 47.3, spot.north = 47.3001;  // 11 m
+  spot.colour = [](int, int) { return std::array<std::uint8_t, 4>{200, 100, 50, 255}; };
+  Pictures pictures({layer_of(spot, 1)});
+  for (int level = 0; level <= 20; ++level) {
+    const geo::TileKey key = geo::tile_at(geo::normal_at(at(47.30005, 8.50005)), level);
+    CAPTURE(geo::to_string(key));
+    for (const ImagePatch& patch : pictures.of(key).patches) CHECK(patch.image.rgba.size() <= 4u * 1024 * 1024);
+  }
+}
+
 TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it all, voids are seen through") {
   MadeRaster region;
   region.width = region.height = 500;
