@@ -12,8 +12,10 @@ namespace {
 
 using glm::dvec3;
 
-/// The sky mesh begins this far below the ellipsoid's horizon, in radii: valleys below the ellipsoid see there.
+/// The sky mesh begins this far below the ellipsoid's horizon: valleys below the ellipsoid see there, in radii; and the planet's
+/// drawn outline lies within the true one, in pixels.
 constexpr double kSkyDip = 0.002;
+constexpr double kSkyDipPixels = 2.5;
 
 glm::dmat4 projection(const view::Camera& camera, bool reversed) {
   const double f = 1.0 / std::tan(camera.vertical_fov.value / 2);
@@ -48,7 +50,7 @@ void add_air(FrameBlock& block, const view::Camera& camera, const FrameLook& loo
   const dvec3 across = std::hypot(up.x, up.y) > 1e-6 ? dvec3(-up.y, up.x, 0.0) : dvec3(0.0, 1.0, 0.0);
   const dvec3 east = glm::normalize(across);
   const double top = 1.0 + air.top_m / ellipsoid.a();
-  const double lowest = tangent_angle(1.0 - kSkyDip, distance);
+  const double lowest = tangent_angle(1.0 - kSkyDip, distance) - kSkyDipPixels * camera.pixel_angle();
   const double highest = distance < top ? std::numbers::pi / 2 : tangent_angle(top, distance);
   // Without shading it is noon wherever the eye is.
   const dvec3 sun = look.lighting ? glm::normalize(look.to_sun.xyz * scale) : up;
