@@ -9,6 +9,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include "options.h"
 
 namespace tellurion::apps {
@@ -59,7 +63,17 @@ void show_progress(int frame, int count) {
   if (frame == count) fmt::print(stderr, "\n");
 }
 
+/// Larger blocks of memory go back to the system at once. Else a software rasteriser's for a frame (100 MB and more) and those
+/// of the workers stay in the allocator's pools; a flight that writes pictures can spare the time that mapping takes.
+void keep_memory_flat() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 64 << 10);
+  mallopt(M_ARENA_MAX, 2);
+#endif
+}
+
 int fly(const FlyOptions& options) {
+  keep_memory_flat();
   auto flight = view::read_flight(options.flight);
   if (!flight) return report(flight.error());
   auto thread = gpu::RenderThread::headless(options.api);
