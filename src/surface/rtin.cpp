@@ -174,14 +174,13 @@ std::vector<float> midpoint_errors(std::span<const float> heights, int side) {
   return errors;
 }
 
-std::vector<float> true_errors(std::span<const double> heights, int side, double enough) {
+std::vector<float> true_errors(std::span<const double> heights, int side) {
   assert(is_rtin_side(side) && heights.size() == static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   std::vector<float> errors(heights.size(), 0.0f);
   for_each_hypotenuse(side, [&](GridPoint m, GridPoint a, GridPoint b, int step, bool diagonal) {
     const float below = largest_below(errors, side, m, step, diagonal);
     float& error = errors[index_of(m.x, m.y, side)];
     error = below;
-    if (static_cast<double>(below) > enough) return;
     // The right angles of the triangles on both sides of the hypotenuse: (b - a) / 2 turned by a right angle.
     const int rx = -(b.y - a.y) / 2, ry = (b.x - a.x) / 2;
     double largest = 0.0;

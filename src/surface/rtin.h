@@ -51,8 +51,7 @@ std::vector<float> midpoint_errors(std::span<const float> heights, int side);
 
 /// True errors: at every point the largest deviation of all grid points from the plane of either triangle that it would
 /// split, or the largest below it. A mesh extracted at a tolerance stays within it at every grid point.
-/// Errors beyond `enough` may be too small, though still beyond it: they save the work of looking on.
-std::vector<float> true_errors(std::span<const double> heights, int side, double enough = HUGE_VAL);
+std::vector<float> true_errors(std::span<const double> heights, int side);
 
 /// The coarsest conforming triangulation that splits wherever `errors` exceed `tolerance`. `errors` must grow towards the
 /// root as those above do.

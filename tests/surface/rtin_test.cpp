@@ -162,8 +162,6 @@ TEST_CASE("true_errors: a mesh stays within its tolerance at every grid point, w
     for (const float tolerance : {2.0f, 10.0f, 40.0f}) {
       const GridTriangles mesh = extract_triangles(true_errors(heights, side), side, tolerance);
       CHECK(largest_deviation(mesh, heights, side) <= static_cast<double>(tolerance));
-      const GridTriangles quick = extract_triangles(true_errors(heights, side, static_cast<double>(tolerance)), side, tolerance);
-      CHECK(quick.indices == mesh.indices);
       const GridTriangles martini = extract_triangles(midpoint_errors(rough, side), side, tolerance);
       if (largest_deviation(martini, heights, side) > static_cast<double>(tolerance)) ++martini_beyond;
     }
