@@ -156,7 +156,7 @@ TEST_CASE("true_errors: a mesh stays within its tolerance at every grid point, w
   std::mt19937_64 random(seed);
   const int side = 65;
   int martini_beyond = 0;
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < 200; ++round) {
     const std::vector<double> heights = hills<double>(side, 1000, random);
     const std::vector<float> rough(heights.begin(), heights.end());
     for (const float tolerance : {2.0f, 10.0f, 40.0f}) {
@@ -166,7 +166,7 @@ TEST_CASE("true_errors: a mesh stays within its tolerance at every grid point, w
       if (largest_deviation(martini, heights, side) > static_cast<double>(tolerance)) ++martini_beyond;
     }
   }
-  CHECK(martini_beyond > 15);  // of 60; 29 were seen once
+  CHECK(martini_beyond > 300);  // half of them: over fewer rounds chance decides
 }
 
 TEST_CASE("largest_deviation: agrees with a direct search over the triangles of every grid point") {
