@@ -78,7 +78,7 @@ int fly(const FlyOptions& options) {
   if (!flight) return report(flight.error());
   auto thread = gpu::RenderThread::headless(options.api);
   if (!thread) return report(thread.error());
-  auto globe = open_globe(options);
+  auto globe = open_globe(options, options.realtime ? RenderThreadUse::draws : RenderThreadUse::waits);
   if (!globe) return report(globe.error());
   auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
   if (!view) return report(view.error());

@@ -1,8 +1,10 @@
 #include "options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <thread>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -124,12 +126,14 @@ int report(const Error& error) {
   return kFailed;
 }
 
-Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options) {
+Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderThreadUse use) {
   auto world = globe::resolve_world(options.world);
   if (!world) return world.error();
   globe::GlobeOptions globe_options;
   globe_options.memory_cache_bytes = options.memory_cache_bytes;
   globe_options.workers = options.workers;
+  // While the render thread waits for a finished picture, its core is the workers' too.
+  if (options.workers < 0 && use == RenderThreadUse::waits) globe_options.workers = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
   globe_options.cache_folder = options.disk_cache;
   auto globe = globe::Globe::open(std::move(*world), globe_options);
   if (globe) {

@@ -55,8 +55,11 @@ void add_camera(CLI::App& app, Options& options);
 /// One line on standard error: what failed, where, what to do. Gives the exit status.
 int report(const Error& error);
 
+/// What the render thread does while tiles are built: draw all the time, or wait until a picture is finished.
+enum class RenderThreadUse { draws, waits };
+
 /// Opens the world that the options name and prints its hints.
-Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options);
+Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderThreadUse use = RenderThreadUse::draws);
 
 /// The camera asked for, else the world's home: its finest data, or the whole body.
 view::Pose camera_or_home(const Options& options, const globe::Globe& globe);

@@ -32,7 +32,7 @@ void draw_for(globe::GlobeView& view, const view::Camera& camera, const globe::V
 int render(const Options& options) {
   auto thread = gpu::RenderThread::headless(options.api);
   if (!thread) return report(thread.error());
-  auto globe = open_globe(options);
+  auto globe = open_globe(options, options.after_ms ? RenderThreadUse::draws : RenderThreadUse::waits);
   if (!globe) return report(globe.error());
   auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
   if (!view) return report(view.error());

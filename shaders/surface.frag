@@ -11,6 +11,9 @@ uniform sampler2DArray u_before;
 uniform vec4 u_tile[8];
 
 in vec2 v_colour_uv;
+#ifdef LOG_DEPTH
+in float v_behind;
+#endif
 #ifdef FADE
 in vec2 v_before_uv;
 #endif
@@ -39,7 +42,7 @@ vec3 level_colour(float level) {
 
 void main() {
 #ifdef LOG_DEPTH
-  gl_FragDepth = log2(1.0 + 1.0 / gl_FragCoord.w) / 40.0;
+  gl_FragDepth = log2(1.0 + 1.0 / gl_FragCoord.w + v_behind) / 40.0;
 #ifdef WIREFRAME
   gl_FragDepth -= 7e-5;  // nearer by 0.002 of the distance
 #endif

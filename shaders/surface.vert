@@ -12,6 +12,9 @@ layout(location = 4) in float a_skirt;
 uniform vec4 u_tile[8];
 
 out vec2 v_colour_uv;
+#ifdef LOG_DEPTH
+out float v_behind;
+#endif
 #ifdef FADE
 out vec2 v_before_uv;
 #endif
@@ -34,13 +37,20 @@ void main() {
   vec3 up = u_tile[2].xyz + a_up_offset;
   float height = mix(a_heights.y, a_heights.x, u_tile[1].w);
   vec3 displaced = exaggeration * (u_tile[0].w * a_up_offset + height * up);
-  if (a_skirt > 0.0) {
+  float behind = 0.0;  // metres, see surface::TileVertex
+  if (a_skirt != 0.0) {
+    behind = u_tile[2].w;
     vec3 outward = a_base - up * dot(a_base, up);
-    displaced -= u_tile[2].w * a_skirt * (up - 0.05 * normalize(outward));
+    displaced -= behind * max(a_skirt, 0.0) * (up - 0.05 * normalize(outward));
   }
   // Near the eye the first sum is exact, so a moving eye does not make vertices jitter.
   vec3 relative = (a_base + u_tile[0].xyz) + u_tile[1].xyz + displaced;
   gl_Position = clip_from_relative * vec4(relative, 1.0);
+#ifdef LOG_DEPTH
+  v_behind = behind;
+#else
+  if (behind > 0.0 && gl_Position.w > 0.0) gl_Position.z *= gl_Position.w / (gl_Position.w + behind);
+#endif
 
 #if defined(WIREFRAME) && !defined(LOG_DEPTH)
   gl_Position.z *= 1.002;  // a little nearer than the surface

@@ -20,7 +20,7 @@ using surface::Part;
 
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
-constexpr std::size_t kMostTiles = 10000;  ///< of a picture
+constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 
 double ms_since(Clock::time_point start) {
@@ -109,6 +109,7 @@ struct GlobeView::State {
   void renew_roots();
   void take_over(double upload_ms);
   void take_over(Finished item);
+  void wait_for_half(Clock::time_point deadline);
   Result<void> upload(const Finished& item);
   bool make_room(Part part);
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
@@ -200,6 +201,17 @@ void GlobeView::State::take_over(double upload_ms) {
     take_over(std::move(*item));
     if (ms_since(start) > upload_ms) break;
   }
+}
+
+/// Takes over half of what is in flight: to select anew after every tile would take longer than to build it.
+void GlobeView::State::wait_for_half(Clock::time_point deadline) {
+  const int enough = in_flight / 2;
+  do {
+    globe.run_one();
+    auto item = finished->pop_until(deadline);
+    if (!item) return;
+    take_over(std::move(*item));
+  } while (in_flight > enough);
 }
 
 void GlobeView::State::update(const view::Camera& camera, const ViewSettings& settings, double upload_ms) {
@@ -304,7 +316,7 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   state->renderer = std::move(*renderer);
   // The ancestors of what a picture shows take a third of that again.
   state->max_bytes = std::max(gpu_budget_bytes / 4 * 3, kLeastBytes);
-  state->max_in_flight = std::max(2 * std::max(globe.worker_count(), 1), 4);
+  state->max_in_flight = 4 * std::max(globe.worker_count(), 1);
   state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
   state->facts = globe.facts();
   if (auto roots = state->load_roots(); !roots) return roots.error();
@@ -343,8 +355,7 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
     if (idle && s.facts == s.globe.facts()) return false;  // the rest has failed for good
     const auto now = Clock::now();
     if (now >= deadline) return false;
-    if (s.globe.run_one()) continue;
-    if (auto item = s.finished->pop_until(std::min(deadline, now + std::chrono::milliseconds(50)))) s.take_over(std::move(*item));
+    s.wait_for_half(std::min(deadline, now + std::chrono::milliseconds(50)));
   }
 }
 

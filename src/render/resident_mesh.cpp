@@ -77,7 +77,7 @@ void ResidentMesh::measure_box(const surface::TileMesh& mesh) {
   lowest_ = std::numeric_limits<double>::max();
   highest_ = -lowest_;
   for (const TileVertex& v : mesh.vertices) {
-    if (v.skirt > 0) continue;
+    if (v.skirt != 0) continue;
     const double height = reference_height_ + static_cast<double>(v.height);
     const glm::dvec3 bare(v.base);
     const glm::dvec3 raised = bare + height * glm::dvec3(v.up_offset);

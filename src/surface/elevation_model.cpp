@@ -11,6 +11,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "surface/lattice_pixels.h"
+
 namespace tellurion::surface {
 namespace {
 
@@ -32,8 +34,8 @@ geo::GeodeticBounds reach_of(const source::RasterDescription& raster) {
 
 bool holds(const geo::GeodeticBounds& bounds, const geo::LatLon& place) {
   if (place.latitude < bounds.south || place.latitude > bounds.north) return false;
-  double east_of_west = std::fmod(place.longitude.value - bounds.west.value, 2.0 * kPi);
-  if (east_of_west < 0.0) east_of_west += 2.0 * kPi;
+  double east_of_west = place.longitude.value - bounds.west.value;
+  east_of_west -= 2.0 * kPi * std::floor(east_of_west / (2.0 * kPi));
   return east_of_west <= bounds.east.value - bounds.west.value;
 }
 
@@ -77,10 +79,76 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
     const geo::GeodeticBounds reach = reach_of(layer.source->description());
-    model.layers_.push_back({&layer, std::move(raster).value(), reach, {}});
+    model.layers_.push_back({&layer, std::move(raster).value(), reach, {}, {}});
   }
   model.description_ = std::move(description);
   return model;
+}
+
+/// Places whose heights are wanted: how a layer sees them, and where the answers go.
+struct ElevationModel::Batch {
+  double wanted_spacing;
+  std::span<double> metres;
+  std::span<double> spacings;  ///< of the finest layer that contributed
+
+  /// Fills `inside` and `pixels` of the layer's samples, with those of `which` that it reaches.
+  virtual void find(HeightLayer& layer, std::span<const std::uint32_t> which) = 0;
+
+ protected:
+  Batch(double wanted, std::span<double> m, std::span<double> s) : wanted_spacing(wanted), metres(m), spacings(s) {}
+  ~Batch() = default;
+};
+
+struct ElevationModel::PlaceBatch final : Batch {
+  PlaceBatch(std::span<const geo::LatLon> p, std::vector<geo::LatLon>& room, double wanted, std::span<double> m, std::span<double> s)
+      : Batch(wanted, m, s), places(p), inside_places(room) {}
+
+  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
+    LayerSamples& out = layer.samples;
+    inside_places.clear();
+    for (const std::uint32_t i : which) {
+      if (!holds(layer.reach, places[i])) continue;
+      out.inside.push_back(i);
+      inside_places.push_back(places[i]);
+    }
+    out.pixels.resize(out.inside.size());
+    layer.raster.reader().to_pixels(inside_places, out.pixels);
+  }
+
+  std::span<const geo::LatLon> places;
+  std::vector<geo::LatLon>& inside_places;
+};
+
+struct ElevationModel::LatticeBatch final : Batch {
+  LatticeBatch(const TileLattice& lattice, std::vector<glm::dvec2>& r, double wanted, std::span<double> m, std::span<double> s)
+      : Batch(wanted, m, s), points(lattice), room(r) {}
+
+  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
+    if (!overlap(points.bounds(), layer.reach)) return;
+    const source::RasterDescription& raster = layer.raster.description();
+    const int level = level_for_spacing(raster, wanted_spacing);
+    room.resize(metres.size());
+    points.find(layer.raster.reader(), raster, level, room);
+    // A pixel beyond the border coverage ends.
+    const glm::dvec2 lowest = -1.0 / source::level_scale(raster, level);
+    const glm::dvec2 highest = glm::dvec2(raster.levels.front().width, raster.levels.front().height) - lowest;
+    LayerSamples& out = layer.samples;
+    for (const std::uint32_t i : which) {
+      const glm::dvec2& pixel = room[i];
+      const bool in_x = raster.wraps || (pixel.x > lowest.x && pixel.x < highest.x);
+      if (!in_x || !(pixel.y > lowest.y && pixel.y < highest.y)) continue;
+      out.inside.push_back(i);
+      out.pixels.push_back(pixel);
+    }
+  }
+
+  LatticePixels points;
+  std::vector<glm::dvec2>& room;
+};
+
+std::span<const std::uint32_t> ElevationModel::all_of(std::size_t count) {
+  for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(static_cast<std::uint32_t>(i));
+  return std::span(numbers_).first(count);
 }
 
 Result<void> ElevationModel::heights(std::span<const geo::Vector<geo::Ecef>> normals, double wanted_spacing,
@@ -92,79 +160,110 @@ Result<void> ElevationModel::heights(std::span<const geo::Vector<geo::Ecef>> nor
 
 Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double wanted_spacing,
                                      std::span<double> metres) {
+  assert(places.size() == metres.size());
   spacings_.resize(places.size());
-  return compose(places, wanted_spacing, metres, spacings_);
+  PlaceBatch batch(places, inside_places_, wanted_spacing, metres, spacings_);
+  return compose(batch, layers_.size(), all_of(places.size()));
 }
 
-Result<void> ElevationModel::compose(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres,
-                                     std::span<double> spacings) {
-  assert(places.size() == metres.size() && places.size() == spacings.size());
-  std::fill(metres.begin(), metres.end(), 0.0);
-  std::fill(spacings.begin(), spacings.end(), std::numeric_limits<double>::infinity());
-  for (HeightLayer& layer : layers_) {
-    inside_.clear();
-    inside_places_.clear();
-    below_.clear();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (!holds(layer.reach, places[i])) continue;
-      inside_.push_back(static_cast<std::uint32_t>(i));
-      inside_places_.push_back(places[i]);
-      below_.push_back(spacings[i]);
+Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_spacing, std::span<double> metres) {
+  assert(metres.size() == static_cast<std::size_t>(lattice.side) * static_cast<std::size_t>(lattice.side));
+  spacings_.resize(metres.size());
+  LatticeBatch batch(lattice, lattice_pixels_, wanted_spacing, metres, spacings_);
+  return compose(batch, layers_.size(), all_of(metres.size()));
+}
+
+/// Heights at the places `which`, by the lowest `layer_count` layers. Layers below are asked only where the uppermost of these
+/// does not hide them.
+Result<void> ElevationModel::compose(Batch& batch, std::size_t layer_count, std::span<const std::uint32_t> which) {
+  if (which.empty()) return {};
+  if (layer_count == 0) {
+    for (const std::uint32_t i : which) {
+      batch.metres[i] = 0.0;
+      batch.spacings[i] = std::numeric_limits<double>::infinity();
     }
-    if (inside_.empty()) continue;
-    if (Result<void> read = sample_layer(layer, wanted_spacing); !read) return read;
-    for (std::size_t i = 0; i < inside_.size(); ++i) {
-      compose_one(metres[inside_[i]], samples_[i], layer.settings->adds);
-      if (samples_[i].coverage > 0.0) spacings[inside_[i]] = std::min(spacings[inside_[i]], finest_[i]);
+    return {};
+  }
+  HeightLayer& layer = layers_[layer_count - 1];
+  LayerSamples& samples = layer.samples;
+  samples.inside.clear();
+  samples.pixels.clear();
+  batch.find(layer, which);
+  if (samples.inside.empty()) return compose(batch, layer_count - 1, which);
+
+  const int level = level_for_spacing(layer.raster.description(), batch.wanted_spacing);
+  const bool adds = layer.settings->adds;
+  samples.heights.resize(samples.inside.size());
+  if (Result<void> read = layer.raster.sample_heights(level, samples.pixels, samples.heights); !read) return read;
+
+  samples.finest.assign(samples.inside.size(), spacing_of_level(layer.raster.description(), level));
+
+  samples.open.clear();
+  samples.below.clear();
+  std::size_t n = 0;  // of the places inside, which are in the order of `which`
+  for (const std::uint32_t i : which) {
+    if (n == samples.inside.size() || samples.inside[n] != i) {
+      samples.below.push_back(i);
+      continue;
     }
+    if (samples.heights[n].coverage >= 1.0 && !adds) {
+      batch.metres[i] = samples.heights[n].metres;
+      batch.spacings[i] = samples.finest[n];
+    } else {
+      samples.below.push_back(i);
+      samples.open.push_back(static_cast<std::uint32_t>(n));
+    }
+    ++n;
+  }
+  if (Result<void> composed = compose(batch, layer_count - 1, samples.below); !composed) return composed;
+  if (!adds) {
+    if (Result<void> filled = fill_voids(layer, level, batch.spacings); !filled) return filled;
+  }
+  for (const std::uint32_t open : samples.open) {
+    const std::uint32_t i = samples.inside[open];
+    const cache::HeightSample& sample = samples.heights[open];
+    compose_one(batch.metres[i], sample, adds);
+    if (sample.coverage > 0.0) batch.spacings[i] = std::min(batch.spacings[i], samples.finest[open]);
   }
   return {};
 }
 
-/// Samples of a layer at inside_places_, its voids filled from coarser levels.
-Result<void> ElevationModel::sample_layer(HeightLayer& layer, double wanted_spacing) {
+/// Fills a layer's voids from its coarser levels, as far as those are finer than what lies below (`spacings`).
+Result<void> ElevationModel::fill_voids(HeightLayer& layer, int level, std::span<double> spacings) {
   const source::RasterDescription& raster = layer.raster.description();
-  const int level = level_for_spacing(raster, wanted_spacing);
-  pixels_.resize(inside_places_.size());
-  samples_.resize(pixels_.size());
-  finest_.assign(pixels_.size(), spacing_of_level(raster, level));
-  layer.raster.reader().to_pixels(inside_places_, pixels_);
-  if (Result<void> read = layer.raster.sample_heights(level, pixels_, samples_); !read) return read;
-  if (layer.settings->adds) return {};
-
-  void_.clear();
-  for (std::size_t i = 0; i < pixels_.size(); ++i) {
-    if (samples_[i].coverage < 1.0 && is_finite(pixels_[i]) && bring_within(raster, level, pixels_[i]).reach > 0.0) {
-      void_.push_back(static_cast<std::uint32_t>(i));
-    }
+  LayerSamples& samples = layer.samples;
+  const auto reach = [&](std::uint32_t n) { return bring_within(raster, level, samples.pixels[n]).reach; };
+  samples.voids.clear();
+  for (const std::uint32_t n : samples.open) {
+    if (is_finite(samples.pixels[n]) && reach(n) > 0.0) samples.voids.push_back(n);
   }
-  for (int coarse = level + 1; coarse <= kCoarsestFill && !void_.empty(); ++coarse) {
+  for (int coarse = level + 1; coarse <= kCoarsestFill && !samples.voids.empty(); ++coarse) {
     const double spacing = spacing_of_level(raster, coarse);
-    std::erase_if(void_, [&](std::uint32_t i) {
-      return spacing > below_[i] || samples_[i].coverage >= bring_within(raster, level, pixels_[i]).reach;
+    std::erase_if(samples.voids, [&](std::uint32_t n) {
+      return spacing > spacings[samples.inside[n]] || samples.heights[n].coverage >= reach(n);
     });
-    void_pixels_.clear();
-    for (const std::uint32_t i : void_) void_pixels_.push_back(bring_within(raster, level, pixels_[i]).pixel);
-    void_samples_.resize(void_.size());
+    samples.void_pixels.clear();
+    for (const std::uint32_t n : samples.voids) samples.void_pixels.push_back(bring_within(raster, level, samples.pixels[n]).pixel);
+    samples.void_heights.resize(samples.voids.size());
     if (Result<void> read = sample_voids(layer, coarse); !read) return read;
-    for (std::size_t n = 0; n < void_.size(); ++n) {
-      const std::uint32_t i = void_[n];
-      const double missing = bring_within(raster, level, pixels_[i]).reach - samples_[i].coverage;
-      const double added = missing * void_samples_[n].coverage;
+    for (std::size_t v = 0; v < samples.voids.size(); ++v) {
+      cache::HeightSample& sample = samples.heights[samples.voids[v]];
+      const cache::HeightSample& fill = samples.void_heights[v];
+      const double added = (reach(samples.voids[v]) - sample.coverage) * fill.coverage;
       if (added <= 0.0) continue;
-      if (samples_[i].coverage == 0.0) finest_[i] = spacing;
-      const double coverage = samples_[i].coverage + added;
-      samples_[i].metres += (void_samples_[n].metres - samples_[i].metres) * (added / coverage);
-      samples_[i].coverage = coverage;
+      if (sample.coverage == 0.0) samples.finest[samples.voids[v]] = spacing;
+      const double coverage = sample.coverage + added;
+      sample.metres += (fill.metres - sample.metres) * (added / coverage);
+      sample.coverage = coverage;
     }
   }
   return {};
 }
 
-/// Samples of a level at void_pixels_, whether the raster has that level or not.
+/// Samples of a level at the layer's void_pixels, whether the raster has that level or not.
 Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
   const int last = static_cast<int>(layer.raster.description().levels.size()) - 1;
-  if (level <= last) return layer.raster.sample_heights(level, void_pixels_, void_samples_);
+  if (level <= last) return layer.raster.sample_heights(level, layer.samples.void_pixels, layer.samples.void_heights);
   while (static_cast<int>(layer.beyond.size()) < level - last) {
     if (layer.beyond.empty()) {
       const Result<CoarseHeights> known = last_level(layer.raster);
@@ -175,7 +274,7 @@ Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
     }
   }
   const CoarseHeights& heights = layer.beyond[static_cast<std::size_t>(level - last - 1)];
-  std::transform(void_pixels_.begin(), void_pixels_.end(), void_samples_.begin(),
+  std::transform(layer.samples.void_pixels.begin(), layer.samples.void_pixels.end(), layer.samples.void_heights.begin(),
                  [&](const glm::dvec2& pixel) { return heights.sample(pixel); });
   return {};
 }
@@ -183,7 +282,8 @@ Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
 Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Lookup lookup, double wanted_spacing) {
   ElevationAnswer answer{0.0, std::numeric_limits<double>::infinity()};
   if (lookup == Lookup::bilinear) {
-    const Result<void> read = compose({&place, 1}, wanted_spacing, {&answer.metres, 1}, {&answer.spacing, 1});
+    PlaceBatch batch({&place, 1}, inside_places_, wanted_spacing, {&answer.metres, 1}, {&answer.spacing, 1});
+    const Result<void> read = compose(batch, layers_.size(), all_of(1));
     return read ? Result<ElevationAnswer>(answer) : read.error();
   }
   for (HeightLayer& layer : layers_) {

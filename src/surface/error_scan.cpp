@@ -75,6 +75,13 @@ struct OnPath {
 /// Where the sample of a column or row lies; two more on either side stand for the border and the end of the slope beyond it.
 double sample_place(int i, int size) { return i < 0 ? i + 1 : i >= size ? i : i + 0.5; }
 
+/// Adds those two to a range of columns or rows that reaches an end of the raster.
+void include_border(int& first, int& count, int size) {
+  const int last = first + count == size ? size + 2 : first + count;
+  if (first == 0) first = -2;
+  count = last - first;
+}
+
 /// A sample of a raster, seen from the face.
 struct FaceSample {
   glm::dvec2 uv{NAN};
@@ -105,10 +112,9 @@ class Scanner {
     tile.key = key;
     tile.rect = geo::face_rect(key);
     tile.steps_per_unit = (kGridSide - 1) / (tile.rect.upper.x - tile.rect.lower.x);
-    const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kGridSide);
-    tile.heights.resize(normals.size());
+    tile.heights.resize(static_cast<std::size_t>(kGridSide) * kGridSide);
     const double spacing = nominal_grid_spacing(model_.description().ellipsoid, key.level);
-    if (Result<void> read = model_.heights(normals, spacing, tile.heights); !read) return read;
+    if (Result<void> read = model_.heights(TileLattice{key, kGridSide}, spacing, tile.heights); !read) return read;
     path_.push_back(std::move(tile));
     return {};
   }
@@ -233,8 +239,11 @@ class Scanner {
   /// Compares all samples of a raster within the leaf with the whole path; and the surface between them, if nothing finer
   /// shapes it.
   Result<void> scan_raster(cache::CachedRaster& raster, bool is_finest) {
-    const source::PixelWindow window = window_under(raster.reader(), raster.description(), path_.back().key);
+    source::PixelWindow window = window_under(raster.reader(), raster.description(), path_.back().key);
     if (window.width <= 0 || window.height <= 0) return {};
+    const source::LevelSize& size = raster.description().levels.front();
+    include_border(window.y, window.height, size.height);
+    if (!raster.description().wraps) include_border(window.x, window.width, size.width);
     // Samples just outside shape the surface within: three of them, in face coordinates.
     const double quarter = model_.description().ellipsoid.b() * std::numbers::pi / 4.0;
     const double ring = 3.0 * raster.description().spacing.value / quarter;
@@ -380,7 +389,7 @@ double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
 }
 
 std::string table_revision(const SurfaceDescription& description) {
-  std::string revision = "bound and common error, grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
+  std::string revision = "bound and common error, borders too, grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
   for (const Layer& layer : description.heights) {
     if (!is_scanned(layer)) continue;
     revision += layer.adds ? "\n+" : "\n=";

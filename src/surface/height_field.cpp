@@ -46,23 +46,21 @@ Result<void> add_samples(ElevationModel& model, const geo::TileKey& key, FinestH
 
 Result<HeightField> field_of_known_error(ElevationModel& model, const geo::TileKey& key, const HeightError& error) {
   HeightField field;
-  field.normals = grid_normals(key, kGridSide);
+  field.normals = grid_normals({key, kGridSide});
   field.heights.resize(field.normals.size());
   field.error = error;
   field.judged_error = static_cast<double>(judged(error));
   const double spacing = nominal_grid_spacing(model.description().ellipsoid, key.level);
-  if (Result<void> read = model.heights(field.normals, spacing, field.heights); !read) return read.error();
+  if (Result<void> read = model.heights(TileLattice{key, kGridSide}, spacing, field.heights); !read) return read.error();
   return field;
 }
 
 Result<HeightField> field_of_finest_data(ElevationModel& model, const geo::TileKey& key) {
   constexpr double kStep = 0.5 / kCells;
-  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kFineSide, -kStep, 1.0 + kStep);
-  std::vector<double> heights(normals.size());
-  if (Result<void> read = model.heights(normals, 0.0, heights); !read) return read.error();
+  std::vector<double> heights(static_cast<std::size_t>(kFineSide) * kFineSide);
+  if (Result<void> read = model.heights(TileLattice{key, kFineSide, -kStep, 1.0 + kStep}, 0.0, heights); !read) return read.error();
   HeightField field;
-  // The grid's own places again, not those of the finer one: neighbours share them to the bit.
-  field.normals = grid_normals(key, kGridSide);
+  field.normals = grid_normals({key, kGridSide});
   field.heights.reserve(field.normals.size());
   for (int row = 0; row < kGridSide; ++row) {
     for (int column = 0; column < kGridSide; ++column) {

@@ -45,6 +45,7 @@ struct Node {
   TileFacts facts;
   float full_grid_error = 0;    ///< full_grid_curvature_error
   std::array<NodePart, kPartCount> parts;
+  std::uint32_t mesh_bytes = 0; ///< of its geometry as last built; 0 if it never was
 
   // Bounds, kept as long as the heights stay.
   OrientedBox box;

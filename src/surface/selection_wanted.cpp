@@ -46,10 +46,10 @@ void inherit_owners(Node& node) {
 
 }  // namespace
 
-std::size_t bytes_of_tile(const TileFacts& facts, const TileMetrics& metrics) {
+std::size_t bytes_of_tile(const TileFacts& facts, std::size_t mesh_bytes) {
   constexpr std::size_t kSlopes = kSlopeSlotSide * kSlopeSlotSide * 4 * 4 / 3;
   constexpr std::size_t kColour = kColourSlotSide * kColourSlotSide * 4 * 4 / 3;
-  return metrics.mesh_bytes + (facts.own_slopes ? kSlopes : 0) + (facts.own_colour ? kColour : 0);
+  return mesh_bytes + (facts.own_slopes ? kSlopes : 0) + (facts.own_colour ? kColour : 0);
 }
 
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
@@ -142,8 +142,11 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
   node.split = wants_split(frame, node);
   if (!node.split) {
     ++selected_;
-    const Resident* geometry = node.resident(Part::geometry);
-    selected_bytes_ += bytes_of_tile(node.facts, geometry != nullptr ? geometry->metrics : TileMetrics());
+    if (node.mesh_bytes > 0) {
+      ++selected_built_;
+      selected_mesh_bytes_ += node.mesh_bytes;
+    }
+    selected_bytes_ += bytes_of_tile(node.facts, node.mesh_bytes > 0 ? node.mesh_bytes : typical_mesh_bytes_);
   } else if (within(frame.settings, kHopelessFactor)) {
     pool_.add_children(node);
     for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);
@@ -153,7 +156,7 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
 
 bool WantedCut::fits(const SelectionFrame& frame, int steps) {
   visited_ = selected_ = 0;
-  selected_bytes_ = 0;
+  selected_built_ = selected_bytes_ = selected_mesh_bytes_ = 0;
   effective_sse_px_ = frame.settings.sse_px * std::pow(kErrorStep, steps);
   split_distance_ = split_distance_in_sizes(frame.errors, effective_sse_px_);
   split_solid_angle_ = split_solid_angle(frame.errors, effective_sse_px_);
@@ -168,11 +171,11 @@ bool WantedCut::within(const SelectionSettings& settings, std::size_t factor) co
 void WantedCut::find(const SelectionFrame& frame) {
   if (!fits(frame, steps_)) {
     while (steps_ < kMostErrorSteps && !fits(frame, ++steps_)) {}
-    return;
+  } else if (steps_ > 0) {
+    while (steps_ > 0 && fits(frame, steps_ - 1)) --steps_;
+    if (steps_ > 0) fits(frame, steps_);  // the last trial marked the nodes for a cut that does not fit
   }
-  if (steps_ == 0) return;
-  while (steps_ > 0 && fits(frame, steps_ - 1)) --steps_;
-  if (steps_ > 0) fits(frame, steps_);  // the last trial marked the nodes for a cut that does not fit
+  if (selected_built_ > 0) typical_mesh_bytes_ = selected_mesh_bytes_ / selected_built_;
 }
 
 }  // namespace tellurion::surface

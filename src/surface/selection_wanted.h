@@ -28,6 +28,7 @@ SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const Sele
 /// know it, so levels are skipped; where they do not, the tile itself has to be resident, and a tile of which nothing is
 /// known yet ends the cut until it is. Built metrics also count where facts said that the tile is good enough. So once
 /// everything wanted is resident, the cut depends on camera, settings, facts and metrics only.
+/// A mesh's size is remembered when it goes: a cut that turned out too large is not tried again and again.
 class WantedCut {
  public:
   WantedCut(NodePool& pool, std::array<UseOrder, kPartCount>& orders) : pool_(pool), orders_(orders) {}
@@ -60,6 +61,9 @@ class WantedCut {
   int visited_ = 0;
   int selected_ = 0;
   std::size_t selected_bytes_ = 0;
+  std::size_t selected_built_ = 0;       ///< those of them whose mesh's size is known
+  std::size_t selected_mesh_bytes_ = 0;  ///< of these
+  std::size_t typical_mesh_bytes_ = 96u << 10;  ///< of a mesh not built yet: the last frame's mean
 };
 
 }  // namespace tellurion::surface

@@ -13,11 +13,11 @@ Result<SlopeMap> build_slopes(ElevationModel& model, const geo::TileKey& key, st
   constexpr int kCorners = kSlopeSlotSide + 1;
   constexpr double kTileTexels = kSlopeSlotSide - 2 * kSlopeGutter;
   const geo::Ellipsoid& ellipsoid = model.description().ellipsoid;
-  const std::vector<geo::Vector<geo::Ecef>> normals =
-      grid_normals(key, kCorners, -kSlopeGutter / kTileTexels, 1.0 + kSlopeGutter / kTileTexels);
+  const TileLattice lattice{key, kCorners, -kSlopeGutter / kTileTexels, 1.0 + kSlopeGutter / kTileTexels};
+  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(lattice);
   std::vector<double> heights(normals.size());
   const double texel = nominal_slope_texel(ellipsoid, key.level);
-  if (Result<void> read = model.heights(normals, texel, heights); !read) return read.error();
+  if (Result<void> read = model.heights(lattice, texel, heights); !read) return read.error();
   if (stop.stop_requested()) return Error{ErrorCode::cancelled, "slopes of " + geo::to_string(key)};
 
   std::vector<glm::dvec3> base(normals.size());

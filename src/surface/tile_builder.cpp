@@ -29,10 +29,9 @@ double wanted_spacing(const SurfaceFacts& facts, const geo::Ellipsoid& ellipsoid
 /// What the parent level's full grid shows at the grid points of its child `key`.
 Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key) {
   constexpr int kHalf = kCells / 2 + 1;
-  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kHalf);
-  std::vector<double> coarse(normals.size());
+  std::vector<double> coarse(static_cast<std::size_t>(kHalf) * kHalf);
   const double spacing = wanted_spacing(facts, model.description().ellipsoid, geo::parent(key));
-  if (Result<void> read = model.heights(normals, spacing, coarse); !read) return read.error();
+  if (Result<void> read = model.heights(TileLattice{key, kHalf}, spacing, coarse); !read) return read.error();
   // A child begins at an even column and row of its parent's grid, so both split their cells alike.
   std::vector<double> heights;
   heights.reserve(static_cast<std::size_t>(kGridSide) * static_cast<std::size_t>(kGridSide));

@@ -39,17 +39,22 @@ struct TileMetrics {
   std::uint32_t mesh_bytes = 96u << 10;
 };
 
+inline constexpr float kSkirtTop = -1.0f;      ///< the upper border of the skirt, where it meets the surface
+inline constexpr float kSkirtRim = 1.0f;       ///< and the lower one
+
 /// One vertex. Position relative to the mesh's origin at exaggeration x, in Ecef axes, where
 /// up = origin_up + up_offset:
-///   base + x * (reference_height * up_offset + height * up) - skirt * skirt_depth * (up - lean)
+///   base + x * (reference_height * up_offset + height * up) - max(skirt, 0) * skirt_depth * (up - lean)
 /// with lean a small outward step (see the shader). `morph` mixes parent_height (0) and height (1).
+/// The whole skirt is taken to be skirt_depth farther away than it is: seen edge-on its depth is hardly known, and it must not
+/// win over a neighbour that it touches.
 struct TileVertex {
   glm::vec3 base;         ///< point of the bare ellipsoid minus origin's point of the bare ellipsoid, metres
   glm::vec3 up_offset;    ///< ellipsoid normal minus origin_up
   float height;           ///< metres above reference_height
   float parent_height;    ///< the same as the parent level shows it here
   glm::vec2 st;           ///< tile coordinates in [0, 1]^2, (0, 0) = lowest u and v
-  float skirt;            ///< 0 on the surface, 1 for the lower rim of the skirt
+  float skirt;            ///< 0 on the surface, kSkirtTop or kSkirtRim
 };
 
 /// One triangulation out of a mesh's vertices: a range of its indices, the surface's triangles first, then the skirt's.
@@ -64,7 +69,7 @@ struct TileMesh {
   geo::Point<geo::Ecef> origin_base;   ///< the tile centre's point of the bare ellipsoid
   geo::Vector<geo::Ecef> origin_up;    ///< unit normal there
   double reference_height = 0;         ///< metres; the origin at exaggeration x is origin_base + x * reference_height * origin_up
-  std::vector<TileVertex> vertices;    ///< surface first, then the skirt's lower rim
+  std::vector<TileVertex> vertices;    ///< surface first, then the skirt's
   std::vector<std::uint16_t> indices;
   std::vector<MeshStep> steps;         ///< from the finest to the coarsest, 1 to kMostMeshSteps of them
 

@@ -11,7 +11,8 @@
 
 namespace tellurion::surface {
 
-std::vector<geo::Vector<geo::Ecef>> grid_normals(const geo::TileKey& key, int side, double first, double last) {
+std::vector<geo::Vector<geo::Ecef>> grid_normals(const TileLattice& lattice) {
+  const auto& [key, side, first, last] = lattice;
   // The mapping of geo::face_normal, with one tangent a column and row instead of two a point. The face's axes are axes of
   // ECEF; a border's slope is exactly 1, so that two faces agree on it to the bit.
   const geo::FaceRect rect = geo::face_rect(key);

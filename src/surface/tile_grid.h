@@ -9,9 +9,17 @@
 
 namespace tellurion::surface {
 
-/// `side` x `side` points from (first, first) to (last, last) in tile coordinates, row by row.
+/// `side` x `side` points evenly spread from (first, first) to (last, last) in tile coordinates, row by row.
+struct TileLattice {
+  geo::TileKey key;
+  int side = 0;
+  double first = 0.0;
+  double last = 1.0;
+};
+
+/// A lattice's points as unit normals.
 /// Points on a tile's border are the same to the bit for every tile of any level that shares it on the face.
-std::vector<geo::Vector<geo::Ecef>> grid_normals(const geo::TileKey& key, int side, double first = 0.0, double last = 1.0);
+std::vector<geo::Vector<geo::Ecef>> grid_normals(const TileLattice& lattice);
 
 /// Length of a tile's side through its face's middle on the ground; the largest of any tile of the level.
 double nominal_tile_size(const geo::Ellipsoid& ellipsoid, int level);

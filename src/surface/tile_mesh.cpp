@@ -90,7 +90,7 @@ DecimatedStep deviations_of(const GridTriangles& triangles, std::span<const glm:
 class Skirt {
  public:
   /// `points`: grid index of every vertex of the surface.
-  Skirt(TileMesh& mesh, std::span<const std::uint32_t> points) : mesh_(mesh), points_(points), rim_of_(points.size(), kNone) {}
+  Skirt(TileMesh& mesh, std::span<const std::uint32_t> points) : mesh_(mesh), points_(points), top_of_(points.size(), kNone) {}
 
   /// Below the border of the surface that the indices from `first` on make.
   void add(std::size_t first) {
@@ -109,8 +109,8 @@ class Skirt {
     for (std::vector<OnBorder>& side : sides) {
       std::sort(side.begin(), side.end(), [](const OnBorder& l, const OnBorder& r) { return l.along < r.along; });
       for (std::size_t i = 0; i + 1 < side.size(); ++i) {
-        const std::uint16_t a = side[i].vertex, b = side[i + 1].vertex;
-        const std::uint16_t below_a = rim(a), below_b = rim(b);
+        const std::uint16_t a = top(side[i].vertex), b = top(side[i + 1].vertex);
+        const auto below_a = static_cast<std::uint16_t>(a + 1), below_b = static_cast<std::uint16_t>(b + 1);
         for (const std::uint16_t index : {a, b, below_b, a, below_b, below_a}) mesh_.indices.push_back(index);
       }
     }
@@ -124,18 +124,22 @@ class Skirt {
     std::uint16_t vertex;
   };
 
-  std::uint16_t rim(std::uint16_t top) {
-    if (rim_of_[top] == kNone) {
-      rim_of_[top] = static_cast<std::uint16_t>(mesh_.vertices.size());
-      mesh_.vertices.push_back(TileVertex(mesh_.vertices[top]));
-      mesh_.vertices.back().skirt = 1.0f;
+  /// The skirt's vertex at a vertex of the surface; that of the lower rim follows it.
+  std::uint16_t top(std::uint16_t surface) {
+    if (top_of_[surface] == kNone) {
+      top_of_[surface] = static_cast<std::uint16_t>(mesh_.vertices.size());
+      TileVertex vertex = mesh_.vertices[surface];
+      for (const float skirt : {kSkirtTop, kSkirtRim}) {
+        vertex.skirt = skirt;
+        mesh_.vertices.push_back(vertex);
+      }
     }
-    return rim_of_[top];
+    return top_of_[surface];
   }
 
   TileMesh& mesh_;
   std::span<const std::uint32_t> points_;
-  std::vector<std::uint16_t> rim_of_;
+  std::vector<std::uint16_t> top_of_;
 };
 
 /// Triangulations of errors in units of the finest tolerance, finest first.
@@ -184,7 +188,7 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
   // The coarser triangulations' points are among those of the finest.
   const std::vector<std::uint32_t>& points = steps.front().points;
   std::vector<std::uint16_t> vertex_of(kPointCount);
-  mesh.vertices.reserve(points.size() + 4 * kGridSide);
+  mesh.vertices.reserve(points.size() + 8 * kGridSide);
   for (const std::uint32_t point : points) {
     vertex_of[point] = static_cast<std::uint16_t>(mesh.vertices.size());
     TileVertex vertex;

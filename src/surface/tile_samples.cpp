@@ -14,7 +14,7 @@ namespace tellurion::surface {
 source::PixelWindow window_under(source::RasterReader& reader, const source::RasterDescription& about, const geo::TileKey& key) {
   constexpr int kSide = 17;
   const source::LevelSize size = about.levels.front();
-  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals(key, kSide);
+  const std::vector<geo::Vector<geo::Ecef>> normals = grid_normals({key, kSide});
   std::vector<geo::LatLon> places(normals.size());
   std::vector<glm::dvec2> pixels(normals.size());
   std::transform(normals.begin(), normals.end(), places.begin(), geo::place_of_normal);

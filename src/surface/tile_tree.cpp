@@ -83,7 +83,9 @@ void TileTree::started(const geo::TileKey& key, Part part) { state_->happens(sta
 void TileTree::cancelled(const geo::TileKey& key, Part part) { state_->happens(state_->pool.at(key), part, Cancel{}); }
 
 void TileTree::arrived_geometry(const geo::TileKey& key, const TileMetrics& metrics, bool has_slopes) {
-  state_->happens(state_->pool.at(key), Part::geometry, Arrive{{metrics, has_slopes}});
+  Node& node = state_->pool.at(key);
+  node.mesh_bytes = metrics.mesh_bytes;
+  state_->happens(node, Part::geometry, Arrive{{metrics, has_slopes}});
 }
 
 void TileTree::arrived_colour(const geo::TileKey& key) {

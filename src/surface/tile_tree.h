@@ -61,7 +61,7 @@ struct Selection {
 };
 
 /// What a tile takes on the GPU: its mesh, and the slots of its own that its facts tell of, colour with mips.
-std::size_t bytes_of_tile(const TileFacts& facts, const TileMetrics& metrics);
+std::size_t bytes_of_tile(const TileFacts& facts, std::size_t mesh_bytes);
 
 class TileTree {
  public:

@@ -249,7 +249,7 @@ TEST_CASE("measure: exaggeration, morph and skirts move the surface as they say"
   tile.morph = 0.25f;
   CHECK(middle_height(2.0) == doctest::Approx(2 * 1275.0).epsilon(1e-5));
   tile.morph = 1.0f;
-  for (auto& v : geometry.mesh.vertices) v.skirt = 1.0f;
+  for (auto& v : geometry.mesh.vertices) v.skirt = surface::kSkirtRim;
   tile.skirt_depth = 30.0f;
   REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, geometry).has_value());
   CHECK(middle_height(1.0) == doctest::Approx(1170.0).epsilon(1e-3));

@@ -177,13 +177,13 @@ TEST_CASE("grid_normals: are those of tile_normal, to the bit on the borders of 
   for (std::uint8_t face = 0; face < 6; ++face) {
     for (int level = 0; level < 6; ++level) {
       const geo::TileKey key{face, static_cast<std::uint8_t>(level), (1u << level) - 1, 0};
-      const auto grid = grid_normals(key, 33, -0.25, 1.25);
+      const auto grid = grid_normals({key, 33, -0.25, 1.25});
       for (std::size_t i = 0; i < grid.size(); ++i) {
         const glm::dvec2 st = glm::dvec2(i % 33, i / 33) / 32.0 * 1.5 - 0.25;
         REQUIRE(glm::distance(grid[i].xyz, geo::tile_normal(key, st).xyz) < 1e-15);
       }
-      const auto whole = grid_normals(key, 65);
-      const auto beyond = grid_normals(geo::neighbour(key, geo::Side::east), 65);
+      const auto whole = grid_normals({key, 65});
+      const auto beyond = grid_normals({geo::neighbour(key, geo::Side::east), 65});
       int shared = 0;
       for (const auto& normal : whole) shared += std::count(beyond.begin(), beyond.end(), normal) > 0;
       REQUIRE(shared == 65);
@@ -202,11 +202,11 @@ TEST_CASE("grid_normals: tiles share their borders to the bit") {
     key.y = static_cast<std::uint32_t>(random() % (1u << level));
     geo::TileKey east = key;
     ++east.x;
-    const auto a = grid_normals(key, kGridSide), b = grid_normals(east, kGridSide);
+    const auto a = grid_normals({key, kGridSide}), b = grid_normals({east, kGridSide});
     for (std::size_t row = 0; row < kGridSide; ++row) {
       REQUIRE(a[row * kGridSide + kGridSide - 1] == b[row * kGridSide]);
     }
-    const auto up = grid_normals(geo::parent(key), kGridSide);
+    const auto up = grid_normals({geo::parent(key), kGridSide});
     constexpr std::size_t kHalf = (kGridSide - 1) / 2;
     const std::size_t first = (key.y & 1) * kHalf * kGridSide + (key.x & 1) * kHalf;
     for (std::size_t j = 0; j <= kHalf; ++j) REQUIRE(up[first + j] == a[2 * j]);

@@ -89,7 +89,7 @@ TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, 
     CAPTURE(geo::to_string(key));
     deepest = std::max<int>(deepest, key.level);
     // The tile's own grid against the surface at random places.
-    const auto normals = grid_normals(key, kGridSide);
+    const auto normals = grid_normals({key, kGridSide});
     std::vector<double> grid(normals.size());
     REQUIRE(world.model->heights(normals, nominal_grid_spacing(geo::kWgs84, key.level), grid));
     std::uniform_real_distribution<double> share(0, 1);

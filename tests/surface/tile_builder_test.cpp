@@ -81,7 +81,7 @@ TEST_CASE("make_tile_mesh: vertices lie within 1e-7 of the tile's size, and 1 mm
     for (int kind = 0; kind < 5; ++kind) {
       const geo::TileKey key = random_key(random, level, kind);
       CAPTURE(geo::to_string(key));
-      const auto normals = grid_normals(key, kGridSide);
+      const auto normals = grid_normals({key, kGridSide});
       std::vector<double> heights;
       std::transform(normals.begin(), normals.end(), std::back_inserter(heights), terrain);
       const double size = nominal_tile_size(geo::kWgs84, level);
@@ -110,7 +110,7 @@ TEST_CASE("make_tile_mesh: triangles face outward, the skirt hangs from every bo
   for (int kind = 0; kind < 5; ++kind) {
     const geo::TileKey key = random_key(random, 3 + kind * 3, kind);
     CAPTURE(geo::to_string(key));
-    const auto normals = grid_normals(key, kGridSide);
+    const auto normals = grid_normals({key, kGridSide});
     std::vector<double> heights;
     std::transform(normals.begin(), normals.end(), std::back_inserter(heights), terrain);
     const double size = nominal_tile_size(geo::kWgs84, key.level);
@@ -119,7 +119,18 @@ TEST_CASE("make_tile_mesh: triangles face outward, the skirt hangs from every bo
     const TileMesh mesh = make_tile_mesh(geo::kWgs84, key, normals, heights, heights, {size / 500, size / 500}, one).mesh;
     const auto position = [&](std::uint16_t i) {
       const TileVertex& v = mesh.vertices[i];
-      return shown(mesh, v) - static_cast<double>(v.skirt) * size / 10 * (mesh.origin_up.xyz + glm::dvec3(v.up_offset));
+      return shown(mesh, v) - static_cast<double>(std::max(v.skirt, 0.0f)) * size / 10 * (mesh.origin_up.xyz + glm::dvec3(v.up_offset));
+    };
+    // The skirt's upper vertices lie on the surface's own.
+    std::map<std::pair<float, float>, std::uint16_t> surface_at;
+    for (std::uint16_t i = 0; i < mesh.vertices.size() && mesh.vertices[i].skirt == 0.0f; ++i) surface_at[{mesh.vertices[i].st.x, mesh.vertices[i].st.y}] = i;
+    const auto on_surface = [&](std::uint16_t i) {
+      const TileVertex& v = mesh.vertices[i];
+      if (v.skirt != kSkirtTop) return i;
+      const std::uint16_t there = surface_at.at({v.st.x, v.st.y});
+      REQUIRE(mesh.vertices[there].base == v.base);
+      REQUIRE(mesh.vertices[there].height == v.height);
+      return there;
     };
     std::map<std::pair<std::uint16_t, std::uint16_t>, int> edges;
     const glm::dvec3 middle = mesh.origin_base.xyz + mesh.reference_height * mesh.origin_up.xyz;
@@ -128,17 +139,17 @@ TEST_CASE("make_tile_mesh: triangles face outward, the skirt hangs from every bo
       const glm::dvec3 front = glm::cross(position(b) - position(a), position(c) - position(a));
       if (i < mesh.steps.front().surface_index_count) {
         REQUIRE(glm::dot(front, mesh.origin_up.xyz) > 0);
-        REQUIRE(mesh.vertices[a].skirt + mesh.vertices[b].skirt + mesh.vertices[c].skirt == 0.0f);
+        REQUIRE((mesh.vertices[a].skirt == 0.0f && mesh.vertices[b].skirt == 0.0f && mesh.vertices[c].skirt == 0.0f));
       } else {
         const glm::dvec3 outward = position(a) - middle;
         REQUIRE(glm::dot(front, outward - glm::dot(outward, mesh.origin_up.xyz) * mesh.origin_up.xyz) > 0);
       }
-      for (const auto& edge : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) ++edges[edge];
+      for (const auto& edge : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) ++edges[{on_surface(edge.first), on_surface(edge.second)}];
     }
     // Closed but for the rim: every edge has its twin, except those between two rim vertices.
     for (const auto& [edge, count] : edges) {
       REQUIRE(count == 1);
-      const bool rim = mesh.vertices[edge.first].skirt == 1.0f && mesh.vertices[edge.second].skirt == 1.0f;
+      const bool rim = mesh.vertices[edge.first].skirt == kSkirtRim && mesh.vertices[edge.second].skirt == kSkirtRim;
       REQUIRE(edges.contains({edge.second, edge.first}) != rim);
     }
   }
@@ -151,7 +162,7 @@ TEST_CASE("make_tile_mesh: the deviations it reports are those of the drawn tria
   for (const int level : {0, 2, 5, 9, 14}) {
     CAPTURE(level);
     const geo::TileKey key = random_key(random, level, level % 5);
-    const auto normals = grid_normals(key, kGridSide);
+    const auto normals = grid_normals({key, kGridSide});
     std::vector<double> heights;
     std::transform(normals.begin(), normals.end(), std::back_inserter(heights), terrain);
     const double size = nominal_tile_size(geo::kWgs84, level);
@@ -204,7 +215,7 @@ TEST_CASE("error_between_samples: bounds the deviation of grids finer than their
     CAPTURE(geo::to_string(key));
     const HeightField field = std::move(field_of_finest_data(*world.model, key)).value();
     constexpr int kDense = 4 * (kGridSide - 1) + 1;
-    const auto normals = grid_normals(key, kDense);
+    const auto normals = grid_normals({key, kDense});
     std::vector<double> truth(normals.size());
     REQUIRE(world.model->heights(normals, 0.0, truth));
     double largest = 0;

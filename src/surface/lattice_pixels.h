@@ -1,0 +1,42 @@
+// Where a tile's lattice lies in rasters, for far less than one projection a point.
+// Not thread-safe while a raster is asked: its reader belongs to one thread.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "geo/geodetic.h"
+#include "geo/tile_key.h"
+#include "source/raster_source.h"
+#include "surface/tile_grid.h"
+
+namespace tellurion::surface {
+
+class LatticePixels {
+ public:
+  explicit LatticePixels(const TileLattice& lattice);
+
+  /// Hold every point of the lattice.
+  const geo::GeodeticBounds& bounds() const { return bounds_; }
+
+  /// Continuous pixel coordinates of level 0 of all points, as RasterReader::to_pixels has them. Projected at every eighth
+  /// point of a row and of a column and cubic between those (Lagrange, four points a direction), if that is within a
+  /// millionth of a pixel of `level` in the middle between them, where it is worst; else projected point by point.
+  void find(source::RasterReader& reader, const source::RasterDescription& raster, int level, std::span<glm::dvec2> pixels) const;
+
+ private:
+  bool interpolate(source::RasterReader& reader, const source::RasterDescription& raster, int level, std::span<glm::dvec2> pixels) const;
+
+  TileLattice lattice_;
+  int control_side_ = 0;                  ///< 0: too few points to gain anything
+  std::vector<geo::LatLon> controls_;     ///< control_side_^2, the last column and row possibly beyond the lattice
+  std::vector<geo::LatLon> middles_;      ///< of the cells between them
+  geo::GeodeticBounds bounds_;
+};
+
+/// Whether two bounds share a place.
+bool overlap(const geo::GeodeticBounds& a, const geo::GeodeticBounds& b);
+
+}  // namespace tellurion::surface
