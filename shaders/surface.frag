@@ -10,7 +10,7 @@ uniform sampler2DArray u_slope;
 uniform sampler2DArray u_before;
 uniform vec4 u_tile[8];
 
-in vec2 v_colour_uv;
+in vec4 v_uv;
 #ifdef LOG_DEPTH
 in float v_behind;
 #endif
@@ -21,12 +21,10 @@ in vec2 v_before_uv;
 in vec2 v_st;
 #endif
 #ifdef LIGHT
-in vec2 v_slope_uv;
-in vec3 v_sun;
-in vec3 v_sunlight;
-in vec3 v_ambient;
-#endif
-#ifdef ATMOSPHERE
+in vec4 v_sun;
+in vec4 v_sunlight;
+in vec4 v_ambient;
+#elif defined(ATMOSPHERE)
 in vec3 v_air_light;
 in vec3 v_air_through;
 #endif
@@ -53,7 +51,7 @@ void main() {
 #elif defined(WIREFRAME)
   o_colour = vec4(level_colour(u_tile[3].w), 1.0);
 #else
-  vec4 texel = texture(u_colour, vec3(v_colour_uv, u_tile[4].w));
+  vec4 texel = texture(u_colour, vec3(v_uv.xy, u_tile[4].w));
 #ifdef FADE
   texel = mix(texture(u_before, vec3(v_before_uv, u_tile[6].w)), texel, u_tile[7].x);
 #endif
@@ -62,11 +60,11 @@ void main() {
 #if defined(LIGHT) || defined(ATMOSPHERE)
   colour *= colour;  // sRGB's curve, nearly
 #ifdef LIGHT
-  vec2 slope = sun.w * texture(u_slope, vec3(v_slope_uv, u_tile[5].w)).rg;
+  vec2 slope = sun.w * texture(u_slope, vec3(v_uv.zw, u_tile[5].w)).rg;
   float facing = (v_sun.z - dot(slope, v_sun.xy)) * inversesqrt(1.0 + dot(slope, slope));
-  colour *= v_ambient + v_sunlight * max(facing, 0.0);
-#endif
-#ifdef ATMOSPHERE
+  colour *= v_ambient.rgb + v_sunlight.rgb * max(facing, 0.0);
+  colour += vec3(v_sun.w, v_sunlight.w, v_ambient.w);
+#else
   colour = colour * v_air_through + v_air_light;
 #endif
   colour = sqrt(colour);

@@ -11,7 +11,8 @@ layout(location = 4) in float a_skirt;
 // 6: the slot that it fades from, likewise        7: fade
 uniform vec4 u_tile[8];
 
-out vec2 v_colour_uv;
+// Few and full: a software rasteriser pays for every one of a triangle.
+out vec4 v_uv;            // of the colour slot, of the slope slot
 #ifdef LOG_DEPTH
 out float v_behind;
 #endif
@@ -22,12 +23,11 @@ out vec2 v_before_uv;
 out vec2 v_st;
 #endif
 #ifdef LIGHT
-out vec2 v_slope_uv;
-out vec3 v_sun;           // direction to the sun along the slope map's tangents and up
-out vec3 v_sunlight;
-out vec3 v_ambient;
-#endif
-#ifdef ATMOSPHERE
+// What of the light reaches the eye through the air, and in w the light of the air itself: red, green, blue.
+out vec4 v_sun;           // direction to the sun along the slope map's tangents and up
+out vec4 v_sunlight;
+out vec4 v_ambient;
+#elif defined(ATMOSPHERE)
 out vec3 v_air_light;
 out vec3 v_air_through;
 #endif
@@ -55,7 +55,7 @@ void main() {
 #if defined(WIREFRAME) && !defined(LOG_DEPTH)
   gl_Position.z *= 1.002;  // a little nearer than the surface
 #endif
-  v_colour_uv = a_st * u_tile[4].x + u_tile[4].yz;
+  v_uv = vec4(a_st * u_tile[4].x + u_tile[4].yz, a_st * u_tile[5].x + u_tile[5].yz);
 #ifdef FADE
   v_before_uv = a_st * u_tile[6].x + u_tile[6].yz;
 #endif
@@ -63,30 +63,37 @@ void main() {
   v_st = a_st;
 #endif
 
+  vec3 air_light = vec3(0.0);
+  vec3 air_through = vec3(1.0);
 #ifdef ATMOSPHERE
   vec3 from_eye = relative * air_scale.xyz;
   float distance_in_air = length(from_eye);
   vec3 direction = from_eye / max(distance_in_air, 1e-12);
   vec3 place = air_eye.xyz + from_eye;
   float enters = min(within_atmosphere(direction).x, distance_in_air);
-  scatter(direction, enters, distance_in_air, enters > 0.0 ? -0.9 : -0.3, 5, v_air_light, v_air_through);
+  scatter(direction, enters, distance_in_air, enters > 0.0 ? -0.9 : -0.3, 5, air_light, air_through);
 #endif
 
 #ifdef LIGHT
-  v_slope_uv = a_st * u_tile[5].x + u_tile[5].yz;
   vec3 tangent_u = normalize(u_tile[3].xyz - up * dot(u_tile[3].xyz, up));
   vec3 tangent_v = cross(tangent_u, up);
-  v_sun = vec3(dot(sun.xyz, tangent_u), dot(sun.xyz, tangent_v), dot(sun.xyz, up));
+  vec3 to_sun = vec3(dot(sun.xyz, tangent_u), dot(sun.xyz, tangent_v), dot(sun.xyz, up));
   // The sun's disc sinks behind the horizon, and twilight follows it.
-  float day = smoothstep(-0.03, 0.05, v_sun.z);
-  float sky = smoothstep(-0.18, 0.25, v_sun.z);
-  v_sunlight = vec3(0.85 * day);
-  v_ambient = vec3(mix(0.025, 0.25, sky));
+  float day = smoothstep(-0.03, 0.05, to_sun.z);
+  float sky = smoothstep(-0.18, 0.25, to_sun.z);
+  vec3 sunlight = vec3(0.85 * day);
+  vec3 ambient = vec3(mix(0.025, 0.25, sky));
 #ifdef ATMOSPHERE
   // Relative to a high sun, under which pictures of the ground were taken.
   vec3 colour = sunlight_at(place) * exp(air_extinction.rgb * air_scale.w);
-  v_sunlight *= min(colour, vec3(1.0));
-  v_ambient *= mix(vec3(0.85, 0.95, 1.2), vec3(1.0), sky);
+  sunlight *= min(colour, vec3(1.0));
+  ambient *= mix(vec3(0.85, 0.95, 1.2), vec3(1.0), sky);
 #endif
+  v_sun = vec4(to_sun, air_light.r);
+  v_sunlight = vec4(sunlight * air_through, air_light.g);
+  v_ambient = vec4(ambient * air_through, air_light.b);
+#elif defined(ATMOSPHERE)
+  v_air_light = air_light;
+  v_air_through = air_through;
 #endif
 }
