@@ -118,7 +118,7 @@ int fly(const FlyOptions& options) {
     summary.frame_ms.push_back(stats.frame_ms);
     summary.last = stats;
     if (!options.trace_file.empty()) trace += globe::trace_line(stats);
-    if (const auto added = sink->add((*view)->picture(camera, settings), frame); !added) return report(added.error());
+    if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
     show_progress(frame + 1, count);
   }
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();

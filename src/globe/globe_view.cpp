@@ -365,6 +365,8 @@ raster::Image GlobeView::picture(const view::Camera& camera, const ViewSettings&
   return s.renderer->picture(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
 }
 
+raster::Image GlobeView::last_picture() { return state_->renderer->last_picture(state_->thread); }
+
 render::GeoPicture GlobeView::measure(const view::Camera& camera, const ViewSettings& settings) {
   State& s = *state_;
   s.selection = &s.tree.select(camera, selection_of(settings, s.max_bytes), Clock::now());

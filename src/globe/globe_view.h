@@ -55,6 +55,8 @@ class GlobeView {
 
   /// The picture as it is now, without loading anything (row 0 on top).
   raster::Image picture(const view::Camera& camera, const ViewSettings& settings);
+  /// What the last `draw` or `picture` drew, without drawing it again.
+  raster::Image last_picture();
   render::GeoPicture measure(const view::Camera& camera, const ViewSettings& settings);
 
   /// The drawn surface's point that `pixel` (continuous, row 0 on top) shows; nothing for the sky. Costs a small pass: for clicks.

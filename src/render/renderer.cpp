@@ -231,17 +231,25 @@ raster::Image Renderer::picture(gpu::RenderThread& thread, const view::Camera& c
                                 std::span<const DrawTile> tiles) {
   thread.check();
   state_->draw_plain(thread, camera, look, tiles);
-  const std::size_t row_bytes = static_cast<std::size_t>(camera.width) * 4;
-  const auto rows = static_cast<std::size_t>(camera.height);
-  std::vector<std::uint8_t> bottom_up(row_bytes * rows);
+  return last_picture(thread);
+}
+
+raster::Image Renderer::last_picture(gpu::RenderThread& thread) {
+  thread.check();
+  const int width = state_->plain.width(), height = state_->plain.height();
+  raster::Image image{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4)};
+  if (image.rgba.empty()) return image;
   glBindFramebuffer(GL_FRAMEBUFFER, state_->plain.framebuffer());
   glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  glReadPixels(0, 0, camera.width, camera.height, GL_RGBA, GL_UNSIGNED_BYTE, bottom_up.data());
+  glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
 
-  raster::Image image{camera.width, camera.height, std::vector<std::uint8_t>(bottom_up.size())};
-  for (std::size_t y = 0; y < rows; ++y)
-    std::memcpy(&image.rgba[y * row_bytes], &bottom_up[(rows - 1 - y) * row_bytes], row_bytes);
+  // Bottom up, as OpenGL has it.
+  const auto row_bytes = static_cast<std::ptrdiff_t>(width) * 4;
+  for (int y = 0; y < height / 2; ++y) {
+    const auto upper = image.rgba.begin() + y * row_bytes, lower = image.rgba.begin() + (height - 1 - y) * row_bytes;
+    std::swap_ranges(upper, upper + row_bytes, lower);
+  }
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
   return image;
 }

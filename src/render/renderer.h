@@ -89,6 +89,8 @@ class Renderer {
   /// Draws into an own target and reads it back (alpha 255).
   raster::Image picture(gpu::RenderThread& thread, const view::Camera& camera, const FrameLook& look,
                         std::span<const surface::DrawTile> tiles);
+  /// What the last `draw` or `picture` drew, without drawing it again; empty if there was none.
+  raster::Image last_picture(gpu::RenderThread& thread);
 
   /// What the picture shows, measured from the depth buffer of an own pass without antialiasing.
   GeoPicture measure(gpu::RenderThread& thread, const view::Camera& camera, const FrameLook& look,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -79,7 +80,7 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
     const geo::GeodeticBounds reach = reach_of(layer.source->description());
-    model.layers_.push_back({&layer, std::move(raster).value(), reach, {}, {}});
+    model.layers_.push_back({&layer, model.layers_.size(), std::move(raster).value(), reach, {}, {}});
   }
   model.description_ = std::move(description);
   return model;
@@ -119,16 +120,25 @@ struct ElevationModel::PlaceBatch final : Batch {
   std::vector<geo::LatLon>& inside_places;
 };
 
+/// Some rows of a lattice.
 struct ElevationModel::LatticeBatch final : Batch {
-  LatticeBatch(const TileLattice& lattice, std::vector<glm::dvec2>& r, double wanted, std::span<double> m, std::span<double> s)
-      : Batch(wanted, m, s), points(lattice), room(r) {}
+  LatticeBatch(const TileLattice& lattice, std::size_t layer_count, std::vector<glm::dvec2>& r, double wanted)
+      : Batch(wanted, {}, {}), points(lattice), in_layers(layer_count), room(r) {}
+
+  void choose_rows(int first, std::span<double> m, std::span<double> s) {
+    first_row = first;
+    metres = m;
+    spacings = s;
+  }
 
   void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
     if (!overlap(points.bounds(), layer.reach)) return;
     const source::RasterDescription& raster = layer.raster.description();
     const int level = level_for_spacing(raster, wanted_spacing);
+    std::optional<LatticePixels::InRaster>& in_raster = in_layers[layer.number];
+    if (!in_raster) in_raster = points.in_raster(layer.raster.reader(), raster, level);
     room.resize(metres.size());
-    points.find(layer.raster.reader(), raster, level, room);
+    in_raster->rows(first_row, room);
     // A pixel beyond the border coverage ends.
     const glm::dvec2 lowest = -1.0 / source::level_scale(raster, level);
     const glm::dvec2 highest = glm::dvec2(raster.levels.front().width, raster.levels.front().height) - lowest;
@@ -142,7 +152,9 @@ struct ElevationModel::LatticeBatch final : Batch {
     }
   }
 
+  int first_row = 0;
   LatticePixels points;
+  std::vector<std::optional<LatticePixels::InRaster>> in_layers;
   std::vector<glm::dvec2>& room;
 };
 
@@ -168,9 +180,17 @@ Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double
 
 Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_spacing, std::span<double> metres) {
   assert(metres.size() == static_cast<std::size_t>(lattice.side) * static_cast<std::size_t>(lattice.side));
-  spacings_.resize(metres.size());
-  LatticeBatch batch(lattice, lattice_pixels_, wanted_spacing, metres, spacings_);
-  return compose(batch, layers_.size(), all_of(metres.size()));
+  // A few rows at a time: all that is kept between the steps of the work stays in the processor's cache.
+  const int rows_at_once = std::max(1, 4096 / lattice.side);
+  LatticeBatch batch(lattice, layers_.size(), lattice_pixels_, wanted_spacing);
+  for (int row = 0; row < lattice.side; row += rows_at_once) {
+    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(lattice.side);
+    const auto count = static_cast<std::size_t>(std::min(rows_at_once, lattice.side - row)) * static_cast<std::size_t>(lattice.side);
+    spacings_.resize(count);
+    batch.choose_rows(row, metres.subspan(first, count), spacings_);
+    if (Result<void> composed = compose(batch, layers_.size(), all_of(count)); !composed) return composed;
+  }
+  return {};
 }
 
 /// Heights at the places `which`, by the lowest `layer_count` layers. Layers below are asked only where the uppermost of these

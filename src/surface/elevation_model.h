@@ -93,6 +93,7 @@ class ElevationModel {
   };
   struct HeightLayer {
     const Layer* settings;
+    std::size_t number;                ///< among the model's layers
     cache::CachedRaster raster;
     geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
     std::vector<CoarseHeights> beyond; ///< levels after the raster's last, made when a void asks for them

@@ -36,23 +36,23 @@ Stencil stencil(double at, int control_side) {
   return {first, {(x - 1) * (x - 2) * (x - 3) / -6, x * (x - 2) * (x - 3) / 2, x * (x - 1) * (x - 3) / -2, x * (x - 1) * (x - 2) / 6}};
 }
 
-/// Values at every `stencils[row]` x `stencils[column]`, from those at the control points.
-void spread(std::span<const glm::dvec2> controls, int control_side, std::span<const Stencil> stencils, std::span<glm::dvec2> values) {
-  const auto side = stencils.size();
-  std::vector<glm::dvec2> rows(static_cast<std::size_t>(control_side) * side);
-  for (std::size_t row = 0; row < static_cast<std::size_t>(control_side); ++row) {
-    const glm::dvec2* from = controls.data() + row * static_cast<std::size_t>(control_side);
-    for (std::size_t x = 0; x < side; ++x) {
-      const auto& [first, w] = stencils[x];
-      const glm::dvec2* p = from + first;
-      rows[row * side + x] = w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3];
-    }
-  }
-  for (std::size_t y = 0; y < side; ++y) {
-    const auto& [first, w] = stencils[y];
-    const glm::dvec2* p = rows.data() + static_cast<std::size_t>(first) * side;
+/// Values at every row x column, from those at the control points.
+void spread(std::span<const glm::dvec2> controls, int control_side, std::span<const Stencil> rows, std::span<const Stencil> columns,
+            std::span<glm::dvec2> values) {
+  const std::size_t side = columns.size();
+  // The control points' columns first, in the rows; then every row's.
+  std::vector<glm::dvec2> row_controls(static_cast<std::size_t>(control_side));
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    const auto& [first_row, v] = rows[y];
+    const auto stride = static_cast<std::size_t>(control_side);
+    const glm::dvec2* p = controls.data() + static_cast<std::size_t>(first_row) * stride;
+    for (std::size_t x = 0; x < stride; ++x) row_controls[x] = v[0] * p[x] + v[1] * p[x + stride] + v[2] * p[x + 2 * stride] + v[3] * p[x + 3 * stride];
     glm::dvec2* to = values.data() + y * side;
-    for (std::size_t x = 0; x < side; ++x) to[x] = w[0] * p[x] + w[1] * p[x + side] + w[2] * p[x + 2 * side] + w[3] * p[x + 3 * side];
+    for (std::size_t x = 0; x < side; ++x) {
+      const auto& [first, w] = columns[x];
+      const glm::dvec2* q = row_controls.data() + first;
+      to[x] = w[0] * q[0] + w[1] * q[1] + w[2] * q[2] + w[3] * q[3];
+    }
   }
 }
 
@@ -101,43 +101,62 @@ LatticePixels::LatticePixels(const TileLattice& lattice) : lattice_(lattice) {
   bounds_ = bounds_of(controls_, control_side_, margin);
 }
 
-void LatticePixels::find(source::RasterReader& reader, const source::RasterDescription& raster, int level, std::span<glm::dvec2> pixels) const {
-  if (control_side_ > 0 && interpolate(reader, raster, level, pixels)) return;
-  reader.to_pixels(places_of(lattice_), pixels);
-}
-
-bool LatticePixels::interpolate(source::RasterReader& reader, const source::RasterDescription& raster, int level,
-                                std::span<glm::dvec2> pixels) const {
-  std::vector<glm::dvec2> controls(controls_.size()), expected(middles_.size()), found(middles_.size());
-  reader.to_pixels(controls_, controls);
-  reader.to_pixels(middles_, expected);
+LatticePixels::InRaster LatticePixels::in_raster(source::RasterReader& reader, const source::RasterDescription& raster, int level) const {
+  InRaster out;
+  out.side_ = lattice_.side;
   const double width = raster.levels.front().width;
-  if (raster.wraps) {
-    // Every point to within half a turn of the one before it.
-    const auto side = static_cast<std::size_t>(control_side_);
-    for (std::size_t i = 1; i < controls.size(); ++i) {
-      const double before = controls[i % side > 0 ? i - 1 : i - side].x;
-      controls[i].x = before + std::remainder(controls[i].x - before, width);
+  if (raster.wraps) out.wrap_width_ = width;
+  const auto is_good = [&] {
+    std::vector<glm::dvec2> expected(middles_.size()), found(middles_.size());
+    reader.to_pixels(middles_, expected);
+    std::vector<Stencil> stencils;
+    for (int i = 0; i + 1 < control_side_; ++i) stencils.push_back(stencil(i + 0.5, control_side_));
+    spread(out.pixels_, control_side_, stencils, stencils, found);
+    const glm::dvec2 scale = source::level_scale(raster, level);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      glm::dvec2 off = (found[i] - expected[i]) * scale;
+      if (raster.wraps) off.x = std::remainder(off.x, width * scale.x);
+      if (!(std::abs(off.x) <= kTolerancePixels && std::abs(off.y) <= kTolerancePixels)) return false;  // NaN too
+    }
+    return true;
+  };
+
+  if (control_side_ > 0) {
+    out.pixels_.resize(controls_.size());
+    reader.to_pixels(controls_, out.pixels_);
+    if (raster.wraps) {
+      // Every point to within half a turn of the one before it.
+      const auto side = static_cast<std::size_t>(control_side_);
+      for (std::size_t i = 1; i < out.pixels_.size(); ++i) {
+        const double before = out.pixels_[i % side > 0 ? i - 1 : i - side].x;
+        out.pixels_[i].x = before + std::remainder(out.pixels_[i].x - before, width);
+      }
+    }
+    if (is_good()) {
+      out.control_side_ = control_side_;
+      return out;
     }
   }
+  const std::vector<geo::LatLon> places = places_of(lattice_);
+  out.pixels_.resize(places.size());
+  reader.to_pixels(places, out.pixels_);
+  return out;
+}
 
-  std::vector<Stencil> stencils;
-  for (int i = 0; i + 1 < control_side_; ++i) stencils.push_back(stencil(i + 0.5, control_side_));
-  spread(controls, control_side_, stencils, found);
-  const glm::dvec2 scale = source::level_scale(raster, level);
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    glm::dvec2 off = (found[i] - expected[i]) * scale;
-    if (raster.wraps) off.x = std::remainder(off.x, width * scale.x);
-    if (!(std::abs(off.x) <= kTolerancePixels && std::abs(off.y) <= kTolerancePixels)) return false;  // NaN too
+void LatticePixels::InRaster::rows(int first_row, std::span<glm::dvec2> pixels) const {
+  if (control_side_ == 0) {
+    const auto first = pixels_.begin() + static_cast<std::ptrdiff_t>(first_row) * side_;
+    std::copy(first, first + static_cast<std::ptrdiff_t>(pixels.size()), pixels.begin());
+    return;
   }
-
-  stencils.clear();
-  for (int i = 0; i < lattice_.side; ++i) stencils.push_back(stencil(static_cast<double>(i) / kStep, control_side_));
-  spread(controls, control_side_, stencils, pixels);
-  if (raster.wraps) {
-    for (glm::dvec2& pixel : pixels) pixel.x -= width * std::floor(pixel.x / width);
+  const int row_count = static_cast<int>(pixels.size()) / side_;
+  std::vector<Stencil> rows, columns;
+  for (int i = 0; i < row_count; ++i) rows.push_back(stencil(static_cast<double>(first_row + i) / kStep, control_side_));
+  for (int i = 0; i < side_; ++i) columns.push_back(stencil(static_cast<double>(i) / kStep, control_side_));
+  spread(pixels_, control_side_, rows, columns, pixels);
+  if (wrap_width_ > 0.0) {
+    for (glm::dvec2& pixel : pixels) pixel.x -= wrap_width_ * std::floor(pixel.x / wrap_width_);
   }
-  return true;
 }
 
 bool overlap(const geo::GeodeticBounds& a, const geo::GeodeticBounds& b) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,11 @@ double largest_distance(const TileLattice& lattice, source::RasterReader& reader
   for (const auto& normal : normals) places.push_back(geo::place_of_normal(normal));
   std::vector<glm::dvec2> exact(places.size()), found(places.size());
   reader.to_pixels(places, exact);
-  LatticePixels(lattice).find(reader, raster, level, found);
+  // In two parts, as nobody needs all at once.
+  const auto in_raster = LatticePixels(lattice).in_raster(reader, raster, level);
+  const auto half = static_cast<std::size_t>(lattice.side / 2) * static_cast<std::size_t>(lattice.side);
+  in_raster.rows(0, std::span(found).first(half));
+  in_raster.rows(lattice.side / 2, std::span(found).subspan(half));
   const glm::dvec2 scale = source::level_scale(raster, level);
   const double width = raster.levels.front().width;
   double largest = 0;
