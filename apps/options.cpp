@@ -110,7 +110,7 @@ void add_view_options(CLI::App& app, Options& options) {
 }
 
 void add_resource_options(CLI::App& app, Options& options) {
-  app.add_option("--workers", options.workers, "threads that load and build; 0: none")->check(CLI::Range(0, 256))->type_name("N");
+  app.add_option("--workers", options.workers, "threads that load and build; 0: none (one less than cores; all of them where a picture is waited for)")->check(CLI::Range(0, 256))->type_name("N");
   const auto megabytes = [&app](const std::string& name, std::size_t& bytes, const std::string& help) {
     app.add_option_function<std::size_t>(name, [&bytes](const std::size_t& mb) { bytes = mb << 20; }, help)
         ->check(CLI::Range(std::size_t{16}, std::size_t{1} << 20))->type_name("MB");

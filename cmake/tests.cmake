@@ -1,4 +1,4 @@
-# All tests, registered with ctest. Labels: quick or slow (each test has one of them), gl (needs an OpenGL context, which
+# All tests, registered with ctest. Labels: quick, slow or long (each test has one of them), gl (needs an OpenGL context, which
 # Mesa gives without a GPU or display), e2e, compile_fail, architecture, fuzz.
 
 find_package(doctest REQUIRED)
@@ -141,7 +141,10 @@ endforeach()
 set(check_includes ${TELLURION_PYTHON} -B ${PROJECT_SOURCE_DIR}/tests/architecture/check_includes.py)
 add_test(NAME architecture_includes COMMAND ${check_includes} ${PROJECT_SOURCE_DIR})
 add_test(NAME architecture_includes_self_test COMMAND ${check_includes} --self-test)
-set_tests_properties(architecture_includes architecture_includes_self_test PROPERTIES
+set(check_names ${TELLURION_PYTHON} -B ${PROJECT_SOURCE_DIR}/tests/architecture/check_names.py)
+add_test(NAME architecture_names COMMAND ${check_names} ${PROJECT_SOURCE_DIR})
+add_test(NAME architecture_names_self_test COMMAND ${check_names} --self-test)
+set_tests_properties(architecture_includes architecture_includes_self_test architecture_names architecture_names_self_test PROPERTIES
   LABELS "quick;architecture" TIMEOUT 60)
 
 # Every header compiles alone: a source file for each, built on demand (and cached) by the test.

@@ -1,6 +1,6 @@
 """Every pixel of --geo lies on the elevation: a few views at a small size; geometry_true_all.py has the rest."""
 # label: slow
-# timeout: 600
+# timeout: 1500
 import unittest
 
 import numpy as np
@@ -53,7 +53,9 @@ class GeometryCase(Case):
         pose = (*place, ground + above_ground, *look)
         geo = self.folder / "geo.tif"
         file = self.world("world", *(("height", path) for path in WORLDS[world]))
-        self.render(file, pose, "--size", "{}x{}".format(*self.size), "--exaggeration", exaggeration, "--geo", geo)
+        # Near walls of a hundred times their height thousands of tiles are wanted, a gigabyte of them.
+        self.render(file, pose, "--size", "{}x{}".format(*self.size), "--exaggeration", exaggeration, "--geo", geo,
+                    "--gpu-cache", 2048, "--timeout", 600)
         self.geo, self.camera, self.shown = read_geo(geo), Camera(EARTH, pose, self.size), rasters
         return Figures(self.geo, self.camera, rasters, exaggeration)
 

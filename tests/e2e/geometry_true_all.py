@@ -1,6 +1,6 @@
 """Every pixel of --geo lies on the elevation: all worlds, near the ground, at 10 km and from space, exaggerated or not."""
-# label: slow
-# timeout: 3600
+# label: long
+# timeout: 36000
 import unittest
 
 from geometry_true import EVEREST_SOUTH, RAINIER_SOUTH, GeometryCase

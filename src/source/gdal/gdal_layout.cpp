@@ -11,6 +11,7 @@
 #include <ogr_spatialref.h>
 
 #include "source/gdal/gdal_runtime.h"
+#include "source/gdal/jpeg_header.h"
 
 namespace tellurion::source {
 namespace {
@@ -285,6 +286,12 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   constexpr double kManySamples = 2e8;
   if (static_cast<double>(layout.georeference.width) * layout.georeference.height > kManySamples && about.levels.size() > 1 && layout.levels[1].overview < 0) {
     about.hints.push_back(fmt::format("{} is large and has no overviews, which makes it slow from afar: run gdaladdo on it once.", options.path));
+  }
+  constexpr double kCoefficientBytes = 2.0, kManyBytes = 64e6;
+  const double decoder_bytes = kCoefficientBytes * about.band_count * layout.georeference.width * layout.georeference.height;
+  if (decoder_bytes > kManyBytes && is_progressive_jpeg(options.path)) {
+    about.hints.push_back(fmt::format("{} is a progressive JPEG, which cannot be read in parts: it is decoded whole, again and again, and takes {:.0f} MB "
+                                      "more for each worker; gdal_translate -of COG makes a file without that.", options.path, decoder_bytes / 1e6));
   }
   layout.heights = plan_heights(*dataset.GetRasterBand(1), options, world);
   return layout;
