@@ -41,7 +41,9 @@ void main() {
   if (a_skirt != 0.0) {
     behind = u_tile[2].w;
     vec3 outward = a_base - up * dot(a_base, up);
-    displaced -= behind * max(a_skirt, 0.0) * (up - 0.05 * normalize(outward));
+    // Outward just enough to be seen from above; slopes grow with exaggeration, and what a step aside changes with them.
+    float lean = 0.05 / max(exaggeration, 1.0);
+    displaced -= behind * max(a_skirt, 0.0) * (up - lean * normalize(outward));
   }
   // Near the eye the first sum is exact, so a moving eye does not make vertices jitter.
   vec3 relative = (a_base + u_tile[0].xyz) + u_tile[1].xyz + displaced;
