@@ -8,7 +8,7 @@ layout(location = 4) in float a_skirt;
 // 0: origin - eye, upper part; reference height   1: origin - eye, lower part; morph
 // 2: normal at the origin; skirt depth            3: tangent of the slope map; level
 // 4: colour slot's scale, offset, layer           5: slope slot's likewise
-// 6: the slot that it fades from, likewise        7: fade
+// 6: the slot that it fades from, likewise        7: fade; sink depth, sink level
 uniform vec4 u_tile[8];
 
 // Few and full: a software rasteriser pays for every one of a triangle.
@@ -37,6 +37,7 @@ void main() {
   vec3 up = u_tile[2].xyz + a_up_offset;
   float height = mix(a_heights.y, a_heights.x, u_tile[1].w);
   vec3 displaced = exaggeration * (u_tile[0].w * a_up_offset + height * up);
+  displaced -= clamp(exaggeration * (u_tile[0].w + height) - u_tile[7].z, 0.0, u_tile[7].y) * up;
   float behind = 0.0;  // metres, see surface::TileVertex
   if (a_skirt != 0.0) {
     behind = u_tile[2].w;

@@ -125,7 +125,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     u.v[4] = slot_place(tile.key, tile.colour_owner, surface::kColourSlotSide, surface::kColourGutter, colour.layer);
     u.v[5] = slot_place(tile.key, tile.slope_owner, surface::kSlopeSlotSide, surface::kSlopeGutter, slopes.layer);
     u.v[6] = u.v[4];
-    u.v[7] = glm::vec4(tile.fade, 0, 0, 0);
+    u.v[7] = glm::vec4(tile.fade, tile.sink_depth, tile.sink_level, 0);
     bind(0, colour.texture);
     bind(1, slopes.texture);
     if (fades) {

@@ -20,6 +20,10 @@ struct DrawTile {
   float error_px = 0.0f;             ///< what the cut thinks of it
   double distance = 0.0;             ///< metres, of the nearest point of its bounds
   std::uint8_t step = 0;             ///< of its mesh
+  /// A coarse tile that stands in may lie above the eye. What of it is higher than `sink_level` (metres above the ellipsoid,
+  /// exaggeration included) is drawn as much lower as it takes, but at most by `sink_depth`.
+  float sink_depth = 0.0f;
+  float sink_level = 0.0f;
 };
 
 }  // namespace tellurion::surface

@@ -9,12 +9,17 @@ namespace {
 constexpr int kFinerLevels = 3;       ///< how far below a missing tile finer ones are looked for
 constexpr double kSkirtPixels = 2;
 
-/// What a tile deviates by at most while it also shows its parent's heights.
-double shown_error(const Node& node) {
+constexpr double kBelowEye = 0.01;    ///< of how far a tile may sink: how far below the eye its highest points are then
+
+/// What a tile's heights deviate by at most while it also shows its parent's.
+double height_error(const Node& node) {
   if (node.morph >= 1 || node.is_root()) return node.shown_bound_m;
   const Node& parent = *node.parent;
   return std::max(node.shown_bound_m, parent.error_known ? parent.bound_m : 4 * node.shown_bound_m);
 }
+
+/// The same, and what it may be drawn lower by.
+double shown_error(const Node& node) { return height_error(node) + node.sink_m; }
 
 bool shows_colour(const Node& node) { return node.is_root() || node.resident(Part::colour) != nullptr; }
 
@@ -30,6 +35,9 @@ void DrawnCut::find(const SelectionFrame& frame, std::vector<DrawTile>& tiles, S
   for (Node* node : nodes_) {
     advance(frame, *node);
     wanted_.choose_step(frame, *node);
+    // Nearer than its error the true surface may be below the eye and the drawn one above it.
+    const double error = height_error(*node);
+    node->sink_m = node->distance < error ? error : 0;
     mark_border(frame, *node);
   }
   tiles.clear();
@@ -187,6 +195,8 @@ DrawTile DrawnCut::tile_of(const SelectionFrame& frame, Node& node) {
   tile.error_px = static_cast<float>(error_px);
   tile.distance = node.distance;
   tile.step = node.step;
+  tile.sink_depth = static_cast<float>(node.sink_m);
+  tile.sink_level = static_cast<float>(frame.eye_height - kBelowEye * node.sink_m);
   return tile;
 }
 

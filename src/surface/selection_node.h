@@ -79,6 +79,7 @@ struct Node {
   std::uint8_t step = 0;        ///< of the mesh
   double shown_bound_m = 0;     ///< as bound_m, of that step
   double shown_px = 0;          ///< as geometry_px
+  double sink_m = 0;            ///< see DrawTile::sink_depth
   FrameNumber bordered = 0;     ///< last frame in which it or a descendant was drawn,
   double border_error_m = 0;    ///< and the largest error among those
 

@@ -59,7 +59,8 @@ SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const Sele
   const ErrorView errors{camera.eye.xyz, camera.pixel_angle(), settings.exaggeration, settings.anisotropy,
                          pool.ellipsoid().a()};
   return {number, now, settings, errors, make_view_volume(camera),
-          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest * settings.exaggeration)};
+          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest * settings.exaggeration),
+          geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value};
 }
 
 void WantedCut::see(const SelectionFrame& frame, Node& node) const {

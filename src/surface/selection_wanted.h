@@ -15,6 +15,7 @@ struct SelectionFrame {
   ErrorView errors;
   ViewVolume volume;
   Horizon horizon;
+  double eye_height = 0;       ///< metres above the ellipsoid
   float transition_step = 1;   ///< share of a transition that passes in this frame
   bool was_drawn(const Node& node) const { return node.drawn + 1 == number; }
 };

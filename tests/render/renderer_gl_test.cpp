@@ -249,6 +249,15 @@ TEST_CASE("measure: exaggeration, morph and skirts move the surface as they say"
   tile.morph = 0.25f;
   CHECK(middle_height(2.0) == doctest::Approx(2 * 1275.0).epsilon(1e-5));
   tile.morph = 1.0f;
+  // Down to the level, but not by more than the depth.
+  tile.sink_depth = 500.0f;
+  tile.sink_level = 2000.0f;
+  CHECK(middle_height(2.0) == doctest::Approx(2000.0).epsilon(1e-5));
+  tile.sink_level = 1000.0f;
+  CHECK(middle_height(2.0) == doctest::Approx(1900.0).epsilon(1e-5));
+  tile.sink_level = 5000.0f;
+  CHECK(middle_height(2.0) == doctest::Approx(2400.0).epsilon(1e-5));
+  tile.sink_depth = 0.0f;
   for (auto& v : geometry.mesh.vertices) v.skirt = surface::kSkirtRim;
   tile.skirt_depth = 30.0f;
   REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, geometry).has_value());

@@ -281,6 +281,7 @@ TEST_CASE("select: skirts reach below what neighbours can deviate by, and stay s
   std::mt19937_64 random(seed);
   int borders = 0;
   int uneven = 0;
+  int sunk = 0;
   for (int i = 0; i < 20; ++i) {
     EvenPlanet planet;
     planet.root_error = 40000;
@@ -291,7 +292,14 @@ TEST_CASE("select: skirts reach below what neighbours can deviate by, and stay s
     Flight flight(planet, random());
     const auto error_of = [&](const DrawTile& tile) {
       const MeshError m = planet.metrics_of(tile.key).steps[tile.step];
-      return static_cast<double>(m.height.bound) * settings.exaggeration + static_cast<double>(m.curvature);
+      const double error = static_cast<double>(m.height.bound) * settings.exaggeration + static_cast<double>(m.curvature);
+      // One that is near enough to hide the eye may be drawn lower by its error, all others are not.
+      if (tile.distance < 0.999 * error) {
+        CHECK(static_cast<double>(tile.sink_depth) >= 0.999 * error);
+        CHECK(static_cast<double>(tile.sink_level) < geo::to_geodetic(planet.ellipsoid, camera.eye).height.value);
+      }
+      if (static_cast<double>(tile.sink_depth) > 0) ++sunk;
+      return error + static_cast<double>(tile.sink_depth);
     };
     for (int frame = 0; frame < 30; ++frame) {  // in mid-load, where neighbours differ most
       const Selection& selection = flight.frame(camera, settings, 15, 10);
@@ -322,6 +330,7 @@ TEST_CASE("select: skirts reach below what neighbours can deviate by, and stay s
   }
   CHECK(borders > 1000);
   CHECK(uneven > 200);
+  CHECK(sunk > 10);
 }
 
 TEST_CASE("select: requests are sorted by gain, unique, bounded, not started, and come again after a failure") {
