@@ -64,7 +64,7 @@ class ElevationModel {
   /// `wanted_spacing` metres apart (0: the finest). Doubles: a float's step of 0.5 mm at 8 km would show in deep tiles.
   Result<void> heights(std::span<const geo::Vector<geo::Ecef>> normals, double wanted_spacing, std::span<double> metres);
   Result<void> heights(std::span<const geo::LatLon> places, double wanted_spacing, std::span<double> metres);
-  /// The same at a lattice's points, at a fifth of the cost: see LatticePixels for how exact the places are.
+  /// The same at a lattice's points, for much less: see LatticePixels for how exact the places are.
   Result<void> heights(const TileLattice& lattice, double wanted_spacing, std::span<double> metres);
 
   /// One height. The same answer from either side of any sample, tile or face border. `nearest` fills no voids.
