@@ -33,11 +33,17 @@ class PictureSink {
   static Result<PictureSink> open(const FlyOptions& options) {
     PictureSink sink;
     if (options.out.extension() == ".mp4") {
+      const auto folder = options.out.parent_path();
+      if (!folder.empty() && !std::filesystem::is_directory(folder))
+        return Error{ErrorCode::not_found, fmt::format("--out {}: there is no folder {}", options.out.string(), folder.string())};
       auto video = globe::VideoWriter::open(options.out, options.width, options.height, options.frames_per_second);
       if (!video) return video.error();
       sink.video_ = std::move(*video);
       return sink;
     }
+    const bool is_folder = std::filesystem::is_directory(options.out);
+    if (options.out.has_extension() && !is_folder)
+      return Error{ErrorCode::invalid_argument, fmt::format("--out {}: a video is a FILE.mp4, pictures go into a folder without an ending", options.out.string())};
     std::error_code failure;
     std::filesystem::create_directories(options.out, failure);
     if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", options.out.string(), failure.message())};
@@ -85,6 +91,7 @@ int fly(const FlyOptions& options) {
   auto sink = PictureSink::open(options);
   if (!sink) return report(sink.error());
 
+  GroundWarning ground(**globe);
   globe::SummaryStats summary;
   std::string trace = globe::trace_header();
   bool complete = true;
@@ -99,7 +106,9 @@ int fly(const FlyOptions& options) {
       if (now > elapsed + 1.0 / options.frames_per_second && frame + 1 < count) continue;
       if (now < elapsed) std::this_thread::sleep_for(std::chrono::duration<double>(elapsed - now));
     }
-    const auto camera = view::make_camera((*globe)->ellipsoid(), flight->pose_at(flight->start_s() + elapsed),
+    const view::Pose pose = flight->pose_at(flight->start_s() + elapsed);
+    ground.check(pose.position, options.view.exaggeration);
+    const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                           to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
     globe::ViewSettings settings = options.view;
     settings.transitions = options.realtime;
@@ -148,7 +157,7 @@ void add_fly(CLI::App& app, Run& run) {
                       "time,lat,lon,height,heading,pitch,roll")->required()->expected(1, 2)->type_name("");
   command->add_option("--out", options->out, "a folder for numbered PNGs, or a video")->required()->type_name("DIR|FILE.mp4");
   command->add_option("--fps", options->frames_per_second, "frames a second (30)")->check(in_range(0.001, 1000.0))->type_name("N");
-  command->add_option("--clock-rate", options->clock_rate, "how fast the world's time runs (1)")->type_name("R");
+  command->add_option("--clock-rate", options->clock_rate, "how fast the world's time runs (1)")->check(in_range(-1e6, 1e6))->type_name("R");
   command->add_flag("--realtime", options->realtime, "by the wall clock, finished or not");
   command->add_option("--timeout", options->timeout_seconds, "for each frame to load (120)")->check(in_range(0.0, 1e6))->type_name("S");
   command->add_option("--stats", options->stats_file, "write the flight's figures")->type_name("FILE.json");

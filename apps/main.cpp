@@ -1,6 +1,8 @@
 // The program `tellurion`: reads the command line and runs one subcommand.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -23,12 +25,19 @@ int run_program(int argc, char** argv) {
   add_height(app, run);
   add_info(app, run);
   add_bench(app, run);
+  const std::string first = argc > 1 ? argv[1] : "";
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  const bool is_command = std::any_of(commands.begin(), commands.end(), [&](const CLI::App* command) { return command->get_name() == first; });
+  if (!first.empty() && first.front() != '-' && !is_command) {
+    fmt::print(stderr, "tellurion: \"{}\" is no command; there are view, render, fly, height, info and bench; see tellurion --help\n", first);
+    return kWrongUsage;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool asked = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
     if (asked) return app.exit(error) == 0 ? kDone : kWrongUsage;
-    fmt::print(stderr, "tellurion: {}; see tellurion --help\n", error.what());
+    fmt::print(stderr, "tellurion: {}; see tellurion {}--help\n", error.what(), is_command ? first + " " : "");
     return kWrongUsage;
   }
   return run();

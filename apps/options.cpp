@@ -28,6 +28,7 @@ Number parse_number(const std::string& text, Number least, Number most, const st
 }
 
 void set_size(const std::string& text, Options& options) {
+  if (std::count(text.begin(), text.end(), 'x') != 1) throw CLI::ValidationError("--size", fmt::format("\"{}\" is not WIDTHxHEIGHT in pixels", text));
   const auto [width, height] = split(text, 'x');
   options.width = parse_number<int>(width, 1, 16384, "--size");
   options.height = parse_number<int>(height, 1, 16384, "--size");
@@ -61,6 +62,15 @@ CLI::Validator in_range(double least, double most) {
     return good ? std::string() : fmt::format("\"{}\" is not a number from {} to {}", text, least, most);
   };
   return CLI::Validator(check, fmt::format("{} to {}", least, most));
+}
+
+CLI::Validator has_ending(const std::string& wanted) {
+  const auto check = [wanted](const std::string& text) {
+    std::string ending = std::filesystem::path(text).extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return ending.empty() || ending == wanted ? std::string() : fmt::format("\"{}\" does not end in {}: no other format is written", text, wanted);
+  };
+  return CLI::Validator(check, "");
 }
 
 void add_world(CLI::App& app, Options& options, bool required) {
@@ -140,6 +150,19 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
     for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
   }
   return globe;
+}
+
+GroundWarning::GroundWarning(const globe::Globe& globe) {
+  if (auto sampler = globe.height_sampler()) sampler_.emplace(std::move(*sampler));
+}
+
+void GroundWarning::check(const geo::Geodetic& eye, double exaggeration) {
+  if (!sampler_) return;
+  const auto ground = sampler_->height_at(geo::place_of(eye));
+  if (!ground || eye.height.value >= exaggeration * ground->height.value) return;
+  fmt::print(stderr, "tellurion: the camera, {:.0f} m above the ellipsoid, is below the ground at {:.0f} m{}: heights of cameras do not count from the ground\n",
+             eye.height.value, exaggeration * ground->height.value, exaggeration != 1.0 ? " (exaggerated)" : "");
+  sampler_.reset();  // once is enough
 }
 
 view::Pose camera_or_home(const Options& options, const globe::Globe& globe) {

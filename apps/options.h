@@ -44,6 +44,9 @@ struct Options {
 /// Accepts numbers from `least` to `most`; not a number is none.
 CLI::Validator in_range(double least, double most);
 
+/// A file's name with this ending, or with none.
+CLI::Validator has_ending(const std::string& wanted);
+
 /// WORLD, as the first word that is no option.
 void add_world(CLI::App& app, Options& options, bool required);
 /// --size, --vfov, --sse and all else that says what a picture shows and how well.
@@ -63,6 +66,16 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
 
 /// The camera asked for, else the world's home: its finest data, or the whole body.
 view::Pose camera_or_home(const Options& options, const globe::Globe& globe);
+
+/// Says on standard error, once, that the camera is below the ground.
+class GroundWarning {
+ public:
+  explicit GroundWarning(const globe::Globe& globe);
+  void check(const geo::Geodetic& eye, double exaggeration);
+
+ private:
+  std::optional<globe::HeightSampler> sampler_;
+};
 
 /// Writes text to a file. Errors: unavailable.
 Result<void> write_text(const std::filesystem::path& file, const std::string& text);

@@ -1,6 +1,7 @@
 // tellurion render: one finished picture, headless.
 #include "commands.h"
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -37,7 +38,9 @@ int render(const Options& options) {
   auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
   if (!view) return report(view.error());
 
-  const auto camera = view::make_camera((*globe)->ellipsoid(), camera_or_home(options, **globe),
+  const view::Pose pose = camera_or_home(options, **globe);
+  GroundWarning(**globe).check(pose.position, options.view.exaggeration);
+  const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                         to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
   std::string trace = globe::trace_header();
   const auto start = Clock::now();
@@ -74,8 +77,10 @@ int render(const Options& options) {
   }
   if (options.after_ms) return (*globe)->data_missing() ? kDataMissing : kDone;
   if (!complete || (*globe)->data_missing()) {
+    const auto hints = (*globe)->hints();  // printed when the world was opened
+    const auto is_known = [&](const std::string& error) { return std::find(hints.begin(), hints.end(), error) != hints.end(); };
     for (const auto& source : (*globe)->source_stats())
-      if (!source.last_error.empty()) fmt::print(stderr, "tellurion: {}\n", source.last_error);
+      if (!source.last_error.empty() && !is_known(source.last_error)) fmt::print(stderr, "tellurion: {}\n", source.last_error);
     fmt::print(stderr, "tellurion: {} is written, but {}\n", options.out.string(),
                complete ? "some data could not be read" : "it is not complete: --timeout gives it more time");
     return kDataMissing;
@@ -89,7 +94,7 @@ void add_render(CLI::App& app, Run& run) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("render", "one finished picture, headless");
   add_world(*command, *options, false);
-  command->add_option("--out", options->out, "the PNG to write")->required()->type_name("FILE.png");
+  command->add_option("--out", options->out, "the PNG to write")->required()->check(has_ending(".png"))->type_name("FILE.png");
   add_camera(*command, *options);
   add_view_options(*command, *options);
   add_resource_options(*command, *options);

@@ -189,12 +189,22 @@ view::Pose Globe::home() const {
     return pose;
   }
   const auto& b = finest->bounds;
-  const double latitude = 0.5 * (b.south.value + b.north.value);
-  const double tall = (b.north.value - b.south.value) * a;
-  const double wide = std::min((b.east.value - b.west.value) * std::cos(latitude), std::numbers::pi / 2) * a;
+  double latitude = 0.5 * (b.south.value + b.north.value);
+  double longitude = 0.5 * (b.west.value + b.east.value);
+  double tall = (b.north.value - b.south.value) * a;
+  double wide = std::min((b.east.value - b.west.value) * std::cos(latitude), std::numbers::pi / 2) * a;
+  constexpr double kPole = std::numbers::pi / 2, kNearly = 1e-3;
+  if (b.east.value - b.west.value > 2.0 * std::numbers::pi - kNearly && std::max(b.north.value, -b.south.value) > kPole - kNearly) {
+    latitude = std::copysign(kPole, b.north.value + b.south.value);  // all round a pole
+    longitude = 0.0;
+    wide = tall = 2.0 * tall;
+  }
   // The default view is 45 degrees high and a good deal wider; a tenth of room all round.
   const double height = 1.2 * std::max(tall, wide / 1.5) / (2.0 * std::tan(to_radians(Degrees(22.5)).value));
-  pose.position = {Radians(latitude), Radians(0.5 * (b.west.value + b.east.value)), EllipsoidalHeight(std::max(height, 100.0))};
+  pose.position = {Radians(latitude), Radians(longitude), EllipsoidalHeight(std::max(height, 100.0))};
+  if (auto sampler = height_sampler()) {
+    if (const auto ground = sampler->height_at(geo::place_of(pose.position))) pose.position.height.value += std::max(ground->height.value, 0.0);
+  }
   return pose;
 }
 

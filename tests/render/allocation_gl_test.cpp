@@ -14,7 +14,7 @@
 namespace {
 
 thread_local std::size_t allocations = 0;
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kCounts = false;  // the sanitizer needs its own operator new
 #else
 constexpr bool kCounts = true;
@@ -22,7 +22,7 @@ constexpr bool kCounts = true;
 
 }  // namespace
 
-#if !defined(__SANITIZE_ADDRESS__)
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // The other forms of new and delete call these.
 void* operator new(std::size_t size) {
   ++allocations;

@@ -45,12 +45,16 @@ Result<void> choose_vertical(GdalLayout& layout, const CrsFacts& facts) {
   about.vertical = kEllipsoidDatum;
   about.vertical_declared = !wanted.empty();
   if (wanted == kEllipsoidDatum || about.kind != SampleKind::height) return {};
+  const bool on_earth = std::abs(layout.world.a() / geo::kWgs84.a() - 1.0) <= 0.01;
   if (wanted.empty()) {
-    about.hints.push_back(fmt::format("{} declares no vertical datum: its heights are taken as above the ellipsoid, which can be 100 m off; "
-                                      "say vertical = \"ellipsoid\", \"egm96\" or another in the world file.", options.path));
+    about.hints.push_back(
+        on_earth ? fmt::format("{} declares no vertical datum: its heights are taken as above the ellipsoid, which can be 100 m off; "
+                               "say vertical = \"ellipsoid\", \"egm96\" or another in a world file.", options.path)
+                 : fmt::format("{} declares no vertical datum: its heights are taken as above the planet's ellipsoid; if that is right, "
+                               "say vertical = \"ellipsoid\" in a world file.", options.path));
     return {};
   }
-  if (std::abs(layout.world.a() / geo::kWgs84.a() - 1.0) > 0.01) {
+  if (!on_earth) {
     return {ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", wanted)};
   }
   Result<VerticalDatum> datum = VerticalDatum::create(wanted);
