@@ -69,12 +69,19 @@ void show_progress(int frame, int count) {
   if (frame == count) fmt::print(stderr, "\n");
 }
 
-/// Larger blocks of memory go back to the system at once. Else a software rasteriser's for a frame (100 MB and more) and those
-/// of the workers stay in the allocator's pools; a flight that writes pictures can spare the time that mapping takes.
+/// Larger blocks of memory go back to the system at once. Else a software rasteriser's for a frame and those of the workers stay
+/// in the allocator's pools; a flight that writes pictures can spare the time that mapping takes.
 void keep_memory_flat() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 64 << 10);
   mallopt(M_ARENA_MAX, 2);
+#endif
+}
+
+/// The same for smaller ones, between pictures.
+void give_memory_back() {
+#ifdef __GLIBC__
+  malloc_trim(0);
 #endif
 }
 
@@ -129,6 +136,7 @@ int fly(const FlyOptions& options) {
     if (!options.trace_file.empty()) trace += globe::trace_line(stats);
     if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
     show_progress(frame + 1, count);
+    give_memory_back();
   }
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   summary.sources = (*globe)->source_stats();

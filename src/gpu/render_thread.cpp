@@ -37,6 +37,7 @@ Capabilities read_capabilities() {
   if (c.anisotropic_filter) glGetFloatv(GL_MAX_TEXTURE_MAX_ANISOTROPY_EXT, &c.max_anisotropy);
   glGetIntegerv(GL_MAX_SAMPLES, &c.max_samples);
   c.renderer = text_of(GL_RENDERER);
+  for (const char* name : {"llvmpipe", "softpipe", "SwiftShader"}) c.is_software = c.is_software || c.renderer.find(name) != std::string::npos;
   c.version = text_of(GL_VERSION);
   return c;
 }

@@ -16,6 +16,7 @@ struct Capabilities {
   bool anisotropic_filter = false;
   float max_anisotropy = 1.0f;
   int max_samples = 1;
+  bool is_software = false;        ///< a rasteriser on the CPU: what it keeps of a frame's triangles is the process' own memory
   std::string renderer;            ///< GL_RENDERER
   std::string version;             ///< GL_VERSION
 };

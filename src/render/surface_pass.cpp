@@ -14,6 +14,9 @@ using surface::DrawTile;
 
 constexpr int kTileVectors = 8;  // u_tile of shaders/surface.vert
 
+/// A software rasteriser draws so many while it sets up the next: it keeps some 280 bytes of each until it has drawn it.
+constexpr std::int64_t kTrianglesAtOnce = 12'000;
+
 /// Scale and offset from the tile coordinates of `tile` to texture coordinates of the slot of `owner`.
 glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int side, int gutter, float layer) {
   const int levels = tile.level - owner.level;
@@ -97,6 +100,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
   std::fill(std::begin(bound_), std::end(bound_), 0u);
 
   FrameFigures figures;
+  std::int64_t flushed = 0;
   const gpu::LinkedProgram* in_use = nullptr;
   for (const DrawTile& tile : tiles) {
     const ResidentTile* resident = store.find(tile.key);
@@ -140,6 +144,10 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     } else {
       mesh.draw_triangles(tile.step);
       figures.triangles += mesh.index_count(tile.step) / 3;
+      if (thread.capabilities().is_software && figures.triangles > flushed + kTrianglesAtOnce) {
+        glFlush();
+        flushed = figures.triangles;
+      }
     }
     ++figures.draws;
   }
