@@ -20,8 +20,8 @@ class Memory(Case):
         flight, trace = self.folder / "flight.csv", self.folder / "trace.csv"
         rows = [",".join(map(str, (*row, 0))) for row in FLIGHT]
         flight.write_text("\n".join(["time,lat,lon,height,heading,pitch,roll", *rows]) + "\n")
-        # All but the progressive JPEG among the pictures, whose decoder alone takes 200 MB (the program says so).
         world = self.world("world", *(("height", path) for path in (ETOPO5, EVEREST, RAINIER)), ("color", BLUE_MARBLE),
+                           ("color", "earth/imagery/bluemarble_bathy_8192x4096.jpg"),
                            ("night", "earth/imagery/night_lights_4096.jpg"),
                            ("water", "earth/imagery/water_mask_1600.png"))
         self.tellurion("fly", world, flight, "--out", self.folder / "frames", "--fps", 2, "--memory-cache", 128,
