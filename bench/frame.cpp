@@ -1,4 +1,5 @@
 // A finished view frame by frame, and the choice of its tiles.
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -100,6 +101,48 @@ Result<void> measure_cut(const Setting& setting, Report& report) {
   return measure_selection(*scene, setting.quick, 300, "tiles_300", report);
 }
 
+/// The first frame after a switch against the frames that follow.
+Result<void> measure_switches(const Setting& setting, Report& report) {
+  auto scene = open_rainier(setting);
+  if (!scene) return scene.error();
+  const view::Camera camera = camera_at(*scene, rainier_pose());
+  const globe::ViewSettings plain;
+  if (auto finished = finish(*scene, camera, plain); !finished) return finished;
+  const auto frame_ms = [&](const globe::ViewSettings& settings) {
+    const Stopwatch watch;
+    scene->view->draw(camera, settings);
+    scene->thread->finish();
+    return watch.ms();
+  };
+  std::vector<double> preparing;
+  for (bool more = true; more;) {
+    const Stopwatch watch;
+    more = scene->view->prepare_switches(plain);
+    if (more) preparing.push_back(watch.ms());
+  }
+  double worst = 0;
+  std::string worst_name;
+  const auto measure = [&](const char* name, bool globe::ViewSettings::*which) {
+    globe::ViewSettings switched = plain;
+    switched.*which = !(switched.*which);
+    const double first = frame_ms(switched);
+    std::vector<double> following;
+    for (int i = 0; i < (setting.quick ? 5 : 21); ++i) following.push_back(frame_ms(switched));
+    frame_ms(plain);
+    const double ratio = first / median(following);
+    if (ratio > worst) worst = ratio, worst_name = name;
+  };
+  measure("lighting", &globe::ViewSettings::lighting);
+  measure("atmosphere", &globe::ViewSettings::atmosphere);
+  measure("wireframe", &globe::ViewSettings::wireframe);
+  measure("bounds", &globe::ViewSettings::bounds);
+  measure("tile_borders", &globe::ViewSettings::tile_borders);
+  measure("antialiasing", &globe::ViewSettings::antialiasing);
+  report.set("first_frame", worst, worst_name + ", the worst of six");
+  report.set("prepare_ms", *std::max_element(preparing.begin(), preparing.end()), "the longest of six");
+  return {};
+}
+
 }  // namespace
 
 std::vector<Benchmark> frame_benchmarks() {
@@ -112,6 +155,10 @@ std::vector<Benchmark> frame_benchmarks() {
             {"tiles", "tiles", {}},
             {"allocations", "allocations", 0.0}},
            measure_frame},
+          {"frame.switches",
+           "lighting, atmosphere, wireframe, bounds, tile borders and antialiasing switched in the same view: the first frame",
+           {{"first_frame", "of the median", {}}, {"prepare_ms", "ms", {}}},
+           measure_switches},
           {"cut.select",
            "choosing the tiles of the view of Mt Rainier, turning by 0.05 degrees a frame, everything loaded",
            {{"tiles_100", "ms", 0.3}, {"tiles_300", "ms", {}}},

@@ -89,6 +89,7 @@ void Viewer::run() {
     advance_clock(now - last);
     if (input_.take_activity()) frames_owed_ = kSettlingFrames;
     if (picture_changes(now)) frame(now, std::min(now - last, kLongestStep));
+    else if (shown_complete_) view_->prepare_switches(state_.view);
     recorder_.note(now, view::pose_of(globe_->ellipsoid(), navigation_->camera()));
     last = now;
   }

@@ -89,7 +89,9 @@ void Globe::State::open_layers() {
     SourceStats stats;
     stats.name = spec.name;
     if (spec.enabled && is_drawn(spec.group)) {
-      auto source = source::open_gdal(gdal_options(spec), world.ellipsoid);
+      source::GdalOptions how = gdal_options(spec);
+      if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
+      auto source = source::open_gdal(how, world.ellipsoid);
       if (source) {
         surface::Layer layer;
         layer.name = spec.name;

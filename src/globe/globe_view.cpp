@@ -373,6 +373,18 @@ render::GeoPicture GlobeView::measure(const view::Camera& camera, const ViewSett
   return s.renderer->measure(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
 }
 
+bool GlobeView::prepare_switches(const ViewSettings& settings) {
+  constexpr bool ViewSettings::*kSwitches[] = {&ViewSettings::lighting, &ViewSettings::atmosphere,   &ViewSettings::wireframe,
+                                               &ViewSettings::bounds,   &ViewSettings::tile_borders, &ViewSettings::antialiasing};
+  State& s = *state_;
+  for (const auto which : kSwitches) {
+    ViewSettings switched = settings;
+    switched.*which = !(switched.*which);
+    if (s.renderer->warm_up(s.thread, look_of(switched, s.globe.world(), view::Camera{}))) return true;
+  }
+  return false;
+}
+
 std::optional<geo::Point<geo::Ecef>> GlobeView::pick(const view::Camera& camera, glm::dvec2 pixel, const ViewSettings& settings) {
   State& s = *state_;
   if (!s.selection) return std::nullopt;

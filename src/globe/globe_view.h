@@ -59,6 +59,10 @@ class GlobeView {
   raster::Image last_picture();
   render::GeoPicture measure(const view::Camera& camera, const ViewSettings& settings);
 
+  /// Compiles for one look that a single switch makes of `settings`, so that switching it does not stall a frame; false if all
+  /// of them are ready. For moments at which a frame may take longer.
+  bool prepare_switches(const ViewSettings& settings);
+
   /// The drawn surface's point that `pixel` (continuous, row 0 on top) shows; nothing for the sky. Costs a small pass: for clicks.
   std::optional<geo::Point<geo::Ecef>> pick(const view::Camera& camera, glm::dvec2 pixel, const ViewSettings& settings);
 

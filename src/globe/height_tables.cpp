@@ -1,7 +1,6 @@
 #include "globe/height_tables.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <mutex>
 #include <stop_token>
 #include <utility>
@@ -9,23 +8,13 @@
 
 #include <fmt/format.h>
 
+#include "base/hash.h"
 #include "base/log.h"
 #include "surface/error_scan.h"
 #include "surface/error_table.h"
 #include "surface/surface_facts_made.h"
 
 namespace tellurion::globe {
-namespace {
-
-/// FNV-1a, 64 bits: the name of a kept table.
-std::uint64_t hash_of(std::string_view text) {
-  std::uint64_t hash = 0xcbf29ce484222325ull;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
-  return hash;
-}
-
-}  // namespace
-
 struct HeightTables::State {
   std::shared_ptr<const surface::SurfaceDescription> surface;
   std::shared_ptr<const surface::SurfaceDescription> scanned;
@@ -109,7 +98,7 @@ HeightTables::HeightTables(std::shared_ptr<const surface::SurfaceDescription> su
   s.pool = &pool;
   s.publish = std::move(publish);
   s.revision = surface::table_revision(*s.surface);
-  if (!cache_folder.empty()) s.file = cache_folder / "tables" / fmt::format("{:016x}.errors", hash_of(s.revision));
+  if (!cache_folder.empty()) s.file = cache_folder / "tables" / fmt::format("{:016x}.errors", fnv1a(s.revision));
 }
 
 HeightTables::~HeightTables() { state_->stop.request_stop(); }

@@ -102,8 +102,10 @@ Result<LinkedProgram> link_program(RenderThread& thread, const ProgramSource& so
   glAttachShader(name, vertex);
   glAttachShader(name, fragment);
   glLinkProgram(name);
-  glDeleteShader(vertex);
-  glDeleteShader(fragment);
+  for (const GLuint shader : {vertex, fragment}) {
+    glDetachShader(name, shader);  // or it would live as long as the program, text and all
+    glDeleteShader(shader);
+  }
   GLint ok = 0;
   glGetProgramiv(name, GL_LINK_STATUS, &ok);
   if (!ok) {

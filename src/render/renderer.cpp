@@ -25,6 +25,13 @@ std::uint32_t features_of(const FrameLook& look, bool air, bool reversed) {
          (look.tile_borders ? SurfacePass::borders : 0u) | (reversed ? 0u : SurfacePass::log_depth);
 }
 
+/// What of a look drivers compile for.
+struct LookPrograms {
+  std::uint32_t features;
+  bool wireframe, bounds, antialiasing;
+  friend bool operator==(const LookPrograms&, const LookPrograms&) = default;
+};
+
 /// A triangle that the camera sees.
 surface::TileGeometry triangle_before(const view::Camera& camera) {
   surface::TileGeometry geometry;
@@ -75,6 +82,7 @@ struct Renderer::State {
   Target plain{GL_RGBA8};
   Target smooth;
   Target measured{GL_R32UI};
+  std::vector<LookPrograms> warm;
 };
 
 Result<std::unique_ptr<Renderer>> Renderer::create(gpu::RenderThread& thread, const RendererOptions& options) {
@@ -90,6 +98,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(gpu::RenderThread& thread, co
   if (auto warmed = state->store.warm_up(thread); !warmed) return warmed.error();
   std::unique_ptr<Renderer> renderer(new Renderer(std::move(state)));
   renderer->warm_up(thread, {});
+  glReleaseShaderCompiler();  // some megabytes, of use again only when a switch is thrown
   return renderer;
 }
 
@@ -194,15 +203,19 @@ FrameFigures Renderer::State::draw_plain(gpu::RenderThread& thread, const view::
   return figures;
 }
 
-void Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
+bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   // One triangle through every variant, into targets of the same kinds: drivers compile at the first draw.
   thread.check();
   State& s = *state_;
+  const LookPrograms programs{features_of(look, s.options.air.has_value(), thread.capabilities().clip_control), look.wireframe, look.bounds,
+                              look.antialiasing};
+  if (std::find(s.warm.begin(), s.warm.end(), programs) != s.warm.end()) return false;
+  s.warm.push_back(programs);
   const geo::TileKey key{.face = geo::kFaceCount};  // no tile of the planet
   view::Camera camera;
   camera.width = camera.height = 16;
   camera.eye = {{2.0 * s.options.ellipsoid.a(), 0.0, 0.0}};
-  if (!s.store.upload_geometry(thread, key, triangle_before(camera))) return;
+  if (!s.store.upload_geometry(thread, key, triangle_before(camera))) return true;
   DrawTile tile{.key = key, .colour_owner = key, .colour_before = key, .slope_owner = key};
   DrawTile fading = tile;
   fading.colour_before.face = 0;
@@ -213,6 +226,7 @@ void Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   glFinish();
   target.release(s.store.budget());
   s.store.release(key, surface::Part::geometry);
+  return true;
 }
 
 FrameFigures Renderer::draw(gpu::RenderThread& thread, const view::Camera& camera, const FrameLook& look,

@@ -79,8 +79,8 @@ class Renderer {
   std::uint64_t bytes_uploaded() const;      ///< since creation
   std::size_t colour_slots_free() const;
 
-  /// Compiles what `look` needs, so that the first frame with it does not stall.
-  void warm_up(gpu::RenderThread& thread, const FrameLook& look);
+  /// Compiles what `look` needs, so that the first frame with it does not stall; false if that was done before.
+  bool warm_up(gpu::RenderThread& thread, const FrameLook& look);
 
   /// Draws into `framebuffer` (0: the context's own) of the camera's size.
   FrameFigures draw(gpu::RenderThread& thread, const view::Camera& camera, const FrameLook& look,

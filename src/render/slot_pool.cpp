@@ -7,7 +7,7 @@
 namespace tellurion::render {
 namespace {
 
-constexpr std::size_t kLayersPerArray = 32;
+constexpr std::size_t kLayersPerArray = 16;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::optional<Slot> SlotPool::acquire(const gpu::RenderThread& thread, Budget& b
   const std::size_t layers = layers_to_add(budget);
   if (layers == 0) return std::nullopt;
 
-  Array array{gpu::Texture(thread), {}};
+  Array array{gpu::Texture(thread), layers, {}};
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D_ARRAY, array.texture.name());
   for (int level = 0; level < format_.levels; ++level) {
@@ -50,10 +50,24 @@ std::optional<Slot> SlotPool::acquire(const gpu::RenderThread& thread, Budget& b
   glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   for (std::size_t layer = layers; layer-- > 1;) array.free_layers.push_back(static_cast<std::uint32_t>(layer));
-  arrays_.push_back(std::move(array));
   allocated_bytes_ += layers * format_.slot_bytes();
   budget.used += layers * format_.slot_bytes();
-  return Slot{static_cast<std::uint32_t>(arrays_.size() - 1), 0};
+  auto place = std::find_if(arrays_.begin(), arrays_.end(), [](const Array& other) { return other.layers == 0; });
+  if (place == arrays_.end()) place = arrays_.insert(place, Array{});
+  *place = std::move(array);
+  return Slot{static_cast<std::uint32_t>(place - arrays_.begin()), 0};
+}
+
+bool SlotPool::give_back(Budget& budget) {
+  bool given = false;
+  for (Array& array : arrays_) {
+    if (array.layers == 0 || array.free_layers.size() < array.layers) continue;
+    allocated_bytes_ -= array.layers * format_.slot_bytes();
+    budget.used -= array.layers * format_.slot_bytes();
+    array = Array{};
+    given = true;
+  }
+  return given;
 }
 
 void SlotPool::release(Slot slot) { arrays_[slot.array].free_layers.push_back(slot.layer); }

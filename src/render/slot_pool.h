@@ -38,6 +38,8 @@ class SlotPool {
   /// A free slot of undefined content; nothing if there is neither one nor room for more.
   std::optional<Slot> acquire(const gpu::RenderThread& thread, Budget& budget);
   void release(Slot slot);
+  /// Frees the arrays that have no slot in use; true if there were any.
+  bool give_back(Budget& budget);
 
   unsigned texture(Slot slot) const { return arrays_[slot.array].texture.name(); }
   const SlotFormat& format() const { return format_; }
@@ -47,6 +49,7 @@ class SlotPool {
  private:
   struct Array {
     gpu::Texture texture;
+    std::size_t layers = 0;                  // 0: given back, its place may be used again
     std::vector<std::uint32_t> free_layers;  // the next one last
   };
 

@@ -1,7 +1,10 @@
 #include "render/surface_pass.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include <epoxy/gl.h>
 
@@ -14,8 +17,37 @@ using surface::DrawTile;
 
 constexpr int kTileVectors = 8;  // u_tile of shaders/surface.vert
 
-/// A software rasteriser draws so many while it sets up the next: it keeps some 280 bytes of each until it has drawn it.
-constexpr std::int64_t kTrianglesAtOnce = 12'000;
+/// Hands triangles to a software rasteriser in portions: it draws some while the next are set up, and keeps some 280 bytes of
+/// each until it has drawn it, so that no more than a few portions may wait.
+class Portions {
+ public:
+  explicit Portions(bool wanted) : wanted_(wanted) {}
+  ~Portions() {
+    for (const GLsync sync : waiting_) glDeleteSync(sync);
+  }
+  Portions(const Portions&) = delete;
+  Portions& operator=(const Portions&) = delete;
+
+  void add(std::int64_t triangles) {
+    constexpr std::int64_t kTriangles = 6'000;
+    constexpr GLuint64 kLongestWait_ns = 1'000'000'000;
+    triangles_ += triangles;
+    if (!wanted_ || triangles_ < kTriangles) return;
+    triangles_ = 0;
+    const GLsync oldest = std::exchange(waiting_[next_], glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0));
+    next_ = (next_ + 1) % waiting_.size();
+    glFlush();
+    if (oldest == nullptr) return;
+    glClientWaitSync(oldest, 0, kLongestWait_ns);
+    glDeleteSync(oldest);
+  }
+
+ private:
+  bool wanted_;
+  std::int64_t triangles_ = 0;
+  std::array<GLsync, 4> waiting_{};
+  std::size_t next_ = 0;
+};
 
 /// Scale and offset from the tile coordinates of `tile` to texture coordinates of the slot of `owner`.
 glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int side, int gutter, float layer) {
@@ -100,7 +132,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
   std::fill(std::begin(bound_), std::end(bound_), 0u);
 
   FrameFigures figures;
-  std::int64_t flushed = 0;
+  Portions portions(thread.capabilities().is_software);
   const gpu::LinkedProgram* in_use = nullptr;
   for (const DrawTile& tile : tiles) {
     const ResidentTile* resident = store.find(tile.key);
@@ -143,11 +175,9 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
       mesh.draw_lines(thread, tile.step);
     } else {
       mesh.draw_triangles(tile.step);
-      figures.triangles += mesh.index_count(tile.step) / 3;
-      if (thread.capabilities().is_software && figures.triangles > flushed + kTrianglesAtOnce) {
-        glFlush();
-        flushed = figures.triangles;
-      }
+      const std::int64_t triangles = mesh.index_count(tile.step) / 3;
+      figures.triangles += triangles;
+      portions.add(triangles);
     }
     ++figures.draws;
   }

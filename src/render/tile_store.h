@@ -56,6 +56,8 @@ class TileStore {
   std::size_t colour_slots_free() const { return colours_.free_slots(budget_); }
 
  private:
+  /// Slot arrays that nothing uses give way.
+  bool has_room(std::size_t bytes);
   void upload_slopes(Slot slot, const surface::SlopeMap& map);
 
   Budget budget_;

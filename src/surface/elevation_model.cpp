@@ -18,6 +18,8 @@ namespace tellurion::surface {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+/// All that is kept between the steps of the work stays in the processor's cache.
+constexpr std::size_t kPlacesAtOnce = 4096;
 
 /// The raster's bounds and the pixel round them across which its coverage falls to 0, with a pixel to spare.
 geo::GeodeticBounds reach_of(const source::RasterDescription& raster) {
@@ -165,23 +167,31 @@ std::span<const std::uint32_t> ElevationModel::all_of(std::size_t count) {
 
 Result<void> ElevationModel::heights(std::span<const geo::Vector<geo::Ecef>> normals, double wanted_spacing,
                                      std::span<double> metres) {
-  places_.resize(normals.size());
-  std::transform(normals.begin(), normals.end(), places_.begin(), geo::place_of_normal);
-  return heights(std::span<const geo::LatLon>(places_), wanted_spacing, metres);
+  assert(normals.size() == metres.size());
+  for (std::size_t first = 0; first < normals.size(); first += kPlacesAtOnce) {
+    const auto some = normals.subspan(first, std::min(kPlacesAtOnce, normals.size() - first));
+    places_.resize(some.size());
+    std::transform(some.begin(), some.end(), places_.begin(), geo::place_of_normal);
+    if (Result<void> found = heights(std::span<const geo::LatLon>(places_), wanted_spacing, metres.subspan(first, some.size())); !found) return found;
+  }
+  return {};
 }
 
 Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double wanted_spacing,
                                      std::span<double> metres) {
   assert(places.size() == metres.size());
-  spacings_.resize(places.size());
-  PlaceBatch batch(places, inside_places_, wanted_spacing, metres, spacings_);
-  return compose(batch, layers_.size(), all_of(places.size()));
+  for (std::size_t first = 0; first < places.size(); first += kPlacesAtOnce) {
+    const std::size_t count = std::min(kPlacesAtOnce, places.size() - first);
+    spacings_.resize(count);
+    PlaceBatch batch(places.subspan(first, count), inside_places_, wanted_spacing, metres.subspan(first, count), spacings_);
+    if (Result<void> composed = compose(batch, layers_.size(), all_of(count)); !composed) return composed;
+  }
+  return {};
 }
 
 Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_spacing, std::span<double> metres) {
   assert(metres.size() == static_cast<std::size_t>(lattice.side) * static_cast<std::size_t>(lattice.side));
-  // A few rows at a time: all that is kept between the steps of the work stays in the processor's cache.
-  const int rows_at_once = std::max(1, 4096 / lattice.side);
+  const int rows_at_once = std::max(1, static_cast<int>(kPlacesAtOnce) / lattice.side);
   LatticeBatch batch(lattice, layers_.size(), lattice_pixels_, wanted_spacing);
   for (int row = 0; row < lattice.side; row += rows_at_once) {
     const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(lattice.side);

@@ -152,6 +152,14 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
     pool_.add_children(node);
     for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);
   }
+}
+
+/// Only what the chosen cut rests on is in use: trials that did not fit must not keep their tiles from being dropped.
+void WantedCut::touch(const SelectionFrame& frame, Node& node) const {
+  if (!node.visible) return;
+  if (node.split && node.children != nullptr) {
+    for (int i = 0; i < 4; ++i) touch(frame, node.children[i]);
+  }
   for (UseOrder& order : orders_) order.touch(node, frame.number);  // after the children: see UseOrder
 }
 
@@ -176,6 +184,7 @@ void WantedCut::find(const SelectionFrame& frame) {
     while (steps_ > 0 && fits(frame, steps_ - 1)) --steps_;
     if (steps_ > 0) fits(frame, steps_);  // the last trial marked the nodes for a cut that does not fit
   }
+  for (Node& root : pool_.roots()) touch(frame, root);
   if (selected_built_ > 0) typical_mesh_bytes_ = selected_mesh_bytes_ / selected_built_;
 }
 

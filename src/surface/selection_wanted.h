@@ -51,6 +51,7 @@ class WantedCut {
   /// Whether what was selected is at most `factor` times what is allowed.
   bool within(const SelectionSettings& settings, std::size_t factor) const;
   void refine(const SelectionFrame& frame, Node& node);
+  void touch(const SelectionFrame& frame, Node& node) const;
   bool wants_split(const SelectionFrame& frame, const Node& node) const;
 
   NodePool& pool_;

@@ -188,11 +188,13 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
   // The coarser triangulations' points are among those of the finest.
   const std::vector<std::uint32_t>& points = steps.front().points;
   std::vector<std::uint16_t> vertex_of(kPointCount);
+  double rounding = 0;  // of the vertices to floats: triangles sink by no more than their corners
   mesh.vertices.reserve(points.size() + 8 * kGridSide);
   for (const std::uint32_t point : points) {
     vertex_of[point] = static_cast<std::uint16_t>(mesh.vertices.size());
     TileVertex vertex;
     vertex.base = glm::vec3(base[point]);
+    rounding = std::max(rounding, glm::distance(glm::dvec3(vertex.base), base[point]));
     vertex.up_offset = glm::vec3((normals[point] - origin_up).xyz);
     vertex.height = static_cast<float>(heights[point] - mesh.reference_height);
     vertex.parent_height = static_cast<float>(parent_heights[point] - mesh.reference_height);
@@ -211,6 +213,7 @@ DecimatedMesh make_tile_mesh(const geo::Ellipsoid& ellipsoid, const geo::TileKey
     step.index_count = static_cast<std::uint32_t>(mesh.indices.size()) - step.first_index;
     mesh.steps.push_back(step);
     out.steps.push_back(deviations_of(triangles, base, heights, tightest_radius));
+    out.steps.back().curvature_deviation += rounding;
   }
   return out;
 }

@@ -30,7 +30,7 @@ struct DecimatedStep {
                                     ///< the full triangulation (see interpolate_in_triangles)
   double height_deviation = 0;      ///< of heights, metres at exaggeration 1; sideways_deviation included
   double sideways_deviation = 0;    ///< the part of it that comes from flat triangles shifting what they show sideways
-  double curvature_deviation = 0;   ///< metres
+  double curvature_deviation = 0;   ///< metres; the rounding of vertices to floats included
 };
 
 struct DecimatedMesh {

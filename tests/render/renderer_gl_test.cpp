@@ -302,6 +302,34 @@ TEST_CASE("upload: what does not fit the budget is refused, and fits after a rel
   CHECK(stage.renderer->bytes_uploaded() > kBudget / 2);
 }
 
+TEST_CASE("upload: what colours took goes to meshes when nothing shows it any more, and back") {
+  Stage stage(gpu::Api::core, "", {.ellipsoid = geo::kWgs84, .gpu_budget_bytes = std::size_t{24} << 20});
+  auto geometry = exact_geometry(geo::kWgs84, {}, flat);
+  const auto imagery = exact_imagery({}, [](const auto&) { return glm::dvec3(0.5); });
+  const std::vector<geo::TileKey> keys = tiles_of_level(4);
+  const auto fill = [&](surface::Part part) {
+    std::size_t count = 0;
+    while (count < keys.size() && (part == surface::Part::colour ? stage.renderer->upload_colour(*stage.thread, keys[count], imagery)
+                                                                 : stage.renderer->upload_geometry(*stage.thread, keys[count], geometry))) {
+      ++count;
+    }
+    return count;
+  };
+  const auto empty = [&](surface::Part part, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) stage.renderer->release(*stage.thread, keys[i], part);
+    stage.thread->empty_graveyard();
+  };
+  const std::size_t all_colours = fill(surface::Part::colour);
+  REQUIRE(all_colours > 10);
+  const std::size_t beside = fill(surface::Part::geometry);
+  empty(surface::Part::geometry, beside);
+  empty(surface::Part::colour, all_colours);
+  const std::size_t all_meshes = fill(surface::Part::geometry);
+  CHECK(all_meshes > 3 * beside);  // colours may take 0.7 of the budget
+  empty(surface::Part::geometry, all_meshes);
+  CHECK(fill(surface::Part::colour) == all_colours);
+}
+
 TEST_CASE("upload: a part that is there already is replaced") {
   Stage stage(gpu::Api::core);
   const geo::TileKey key{};

@@ -412,6 +412,29 @@ TEST_CASE("eviction_candidate: never a tile of the last frame, never a root, chi
   CHECK(flight.tree.select(random_camera(planet.ellipsoid, random), settings, flight.now).draw.size() > 0);
 }
 
+TEST_CASE("eviction_candidate: tiles of a cut that was tried and did not fit may be dropped") {
+  const EvenPlanet planet;
+  Flight flight(planet);
+  const view::Camera camera = camera_at(planet.ellipsoid, 20, 50, 30000, 10, -10);
+  SelectionSettings settings;
+  settings.sse_px = 0.1;
+  const Selection* all = flight.finish(camera, settings);
+  REQUIRE(all != nullptr);
+  std::set<geo::TileKey> finer;
+  for (const DrawTile& tile : all->draw) finer.insert(tile.key);
+  settings.max_tiles = finer.size() / 2;
+  const Selection* fewer = flight.finish(camera, settings);
+  REQUIRE(fewer != nullptr);
+  for (const DrawTile& tile : fewer->draw) finer.erase(tile.key);
+  REQUIRE(finer.size() > 20);
+  while (const auto key = flight.tree.eviction_candidate(Part::geometry)) {
+    finer.erase(*key);
+    flight.tree.released(*key, Part::geometry);
+  }
+  CHECK(finer.empty());
+  CHECK(flight.tree.select(camera, settings, flight.now).stats.complete);
+}
+
 TEST_CASE("eviction_candidate: a child that arrived after its parents goes before them") {
   EvenPlanet planet;
   Flight flight(planet);

@@ -12,6 +12,7 @@
 
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/jpeg_header.h"
+#include "source/gdal/unpacked_copy.h"
 
 namespace tellurion::source {
 namespace {
@@ -250,6 +251,7 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   const QuietErrors quiet;
   GdalLayout layout;
   layout.options = options;
+  layout.file = options.path;
   layout.world = world;
   RasterDescription& about = layout.description;
   about.name = options.path;
@@ -290,8 +292,15 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   constexpr double kCoefficientBytes = 2.0, kManyBytes = 64e6;
   const double decoder_bytes = kCoefficientBytes * about.band_count * layout.georeference.width * layout.georeference.height;
   if (decoder_bytes > kManyBytes && is_progressive_jpeg(options.path)) {
-    about.hints.push_back(fmt::format("{} is a progressive JPEG, which cannot be read in parts: it is decoded whole, again and again, and takes {:.0f} MB "
-                                      "more for each worker; gdal_translate -of COG makes a file without that.", options.path, decoder_bytes / 1e6));
+    const Result<std::string> copy = options.unpack_folder.empty() ? Error{ErrorCode::unavailable, "there is no cache folder for a copy that can"}
+                                                                   : unpacked_copy(dataset, layout.revision, options.unpack_folder);
+    if (copy) {
+      layout.file = copy.value();
+    } else {
+      about.hints.push_back(fmt::format("{} is a progressive JPEG, which cannot be read in parts: it is decoded whole, again and again, and takes {:.0f} MB "
+                                        "more for each worker ({}); gdal_translate -of COG makes a file without that.",
+                                        options.path, decoder_bytes / 1e6, copy.error().message));
+    }
   }
   layout.heights = plan_heights(*dataset.GetRasterBand(1), options, world);
   return layout;

@@ -46,6 +46,7 @@ struct ColourPlan {
 /// Immutable after opening.
 struct GdalLayout {
   GdalOptions options;
+  std::string file;      ///< what readers open: the raster itself, or its unpacked copy
   geo::Ellipsoid world;
   RasterDescription description;
   Georeference georeference;

@@ -21,7 +21,7 @@ GdalReader::GdalReader(std::shared_ptr<const GdalLayout> layout, GDALDatasetUniq
     : layout_(std::move(layout)), dataset_(std::move(dataset)), mapping_(std::move(mapping)), datum_(std::move(datum)) {}
 
 Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalLayout> layout) {
-  Result<GDALDatasetUniquePtr> dataset = open_dataset(layout->options.path);
+  Result<GDALDatasetUniquePtr> dataset = open_dataset(layout->file);
   if (!dataset) return dataset.error();
   const LevelSize& full = layout->description.levels.front();
   if (dataset.value()->GetRasterXSize() != full.width || dataset.value()->GetRasterYSize() != full.height ||

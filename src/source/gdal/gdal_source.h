@@ -23,6 +23,7 @@ struct GdalOptions {
   std::optional<double> scale{};           ///< value = sample * scale + offset; else the file's own
   std::optional<double> offset{};
   std::optional<std::array<int, 3>> rgb_bands{};  ///< 1-based
+  std::string unpack_folder{};             ///< for copies of rasters that cannot be read in parts; empty: no copies
 };
 
 /// Process-wide set-up: drivers, no network, block cache of `block_cache_bytes`. Safe to call again.
