@@ -145,6 +145,8 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
   // While the render thread waits for a finished picture, its core is the workers' too.
   if (options.workers < 0 && use == RenderThreadUse::waits) globe_options.workers = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
   globe_options.cache_folder = options.disk_cache;
+  globe_options.disk_cache_bytes = options.disk_cache_bytes;
+  globe_options.offline = options.offline;
   auto globe = globe::Globe::open(std::move(*world), globe_options);
   if (globe) {
     for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);

@@ -18,6 +18,7 @@ enum class ErrorCode {
   corrupt,           ///< the bytes are wrong: retrying cannot help
   unsupported,       ///< right bytes, but nothing that we read
   cancelled,         ///< nobody wants the answer any more
+  pending,           ///< on its way: ask again once it is there
   exhausted,         ///< a bound (memory, size, count) was reached
   internal,          ///< a library failed in a way that it did not explain
 };
@@ -37,6 +38,8 @@ constexpr const char* name_of(ErrorCode code) {
       return "unsupported";
     case ErrorCode::cancelled:
       return "cancelled";
+    case ErrorCode::pending:
+      return "pending";
     case ErrorCode::exhausted:
       return "exhausted";
     case ErrorCode::internal:

@@ -96,8 +96,9 @@ Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const D
     ++done.blocks;
     done.bytes += static_cast<std::int64_t>(block_bytes);
     keep(name, block, sizeof(Entry) + block_bytes);
-  } else if (const Error& error = flight->outcome->error(); error.code != ErrorCode::cancelled) {
+  } else if (const Error& error = flight->outcome->error(); error.code != ErrorCode::cancelled && error.code != ErrorCode::pending) {
     ++done.errors;
+    if (error.code != ErrorCode::unavailable) ++done.lost;
     done.last_error = error.message;
   }
   lock.unlock();

@@ -32,6 +32,7 @@ struct SourceReads {
   std::int64_t blocks = 0;
   std::int64_t bytes = 0;  ///< as decoded
   std::int64_t errors = 0;
+  std::int64_t lost = 0;   ///< of the errors: those that asking again cannot mend
   std::string last_error;
 };
 

@@ -4,7 +4,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <map>
 #include <utility>
 
 namespace tellurion::cache {
@@ -56,6 +58,13 @@ Result<CachedRaster> CachedRaster::open(const source::RasterSource& source, Bloc
   return raster;
 }
 
+bool CachedRaster::take_pending(source::Awaited& awaited) {
+  if (!std::exchange(pending_, false)) return false;
+  absent_.clear();
+  for (auto& arrival : reader_->take_awaited()) awaited.push_back(std::move(arrival));
+  return true;
+}
+
 Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int column, int row) {
   const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
   const auto found = std::find_if(held_.begin(), held_.end(), [&](const Held& held) { return held.key == key; });
@@ -69,7 +78,16 @@ Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int colu
     const int y = row * kBlockSide;
     return reader_->read_heights(level, {x, y, std::min(kBlockSide, size.width - x), std::min(kBlockSide, size.height - y)});
   };
+  for (const Held& absent : absent_) {
+    if (absent.key == key) return absent.block.get();
+  }
   Result<Frozen<raster::HeightGrid>> block = cache_->heights(key, std::cref(decode));
+  if (!block && block.error().code == ErrorCode::pending) {
+    pending_ = true;
+    raster::HeightGrid zeros{kBlockSide, kBlockSide, std::vector<float>(static_cast<std::size_t>(kBlockSide) * kBlockSide, 0.0f)};
+    absent_.push_back(Held{key, freeze(std::move(zeros))});
+    return absent_.back().block.get();
+  }
   if (!block) return block.error();
   if (held_.size() == kHeldBlocks) held_.pop_back();
   held_.insert(held_.begin(), Held{key, std::move(block).value()});
@@ -148,19 +166,20 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
   image.rgba.resize(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height) * 4);
 
   // Runs of pixels that come from one block, copied row by row.
-  std::vector<Frozen<raster::Image>> row_blocks;
+  std::map<int, Frozen<raster::Image>> row_blocks;
   int row_of_blocks = -1;
+  bool pending = false;
   for (int j = 0; j < window.height; ++j) {
     const int y = real_index(window.y + j, size.height, false);
     const int row = y / kBlockSide;
     if (row != row_of_blocks) {
-      row_blocks.assign(static_cast<std::size_t>((size.width + kBlockSide - 1) / kBlockSide), {});
+      row_blocks.clear();
       row_of_blocks = row;
     }
     for (int i = 0; i < window.width;) {
       const int x = real_index(window.x + i, size.width, wraps);
       const int column = x / kBlockSide;
-      Frozen<raster::Image>& block = row_blocks[static_cast<std::size_t>(column)];
+      Frozen<raster::Image>& block = row_blocks[column];
       if (!block) {
         const int left = column * kBlockSide;
         const int top = row * kBlockSide;
@@ -170,8 +189,15 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
         };
         const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
         Result<Frozen<raster::Image>> decoded = cache_->image(key, std::cref(decode));
-        if (!decoded) return decoded.error();
-        block = std::move(decoded).value();
+        if (decoded) {
+          block = std::move(decoded).value();
+        } else if (decoded.error().code == ErrorCode::pending) {
+          pending = true;  // the others are asked for too
+          const int width = std::min(kBlockSide, size.width - left), height = std::min(kBlockSide, size.height - top);
+          block = freeze(raster::Image{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4)});
+        } else {
+          return decoded.error();
+        }
       }
       const int inner_x = x - column * kBlockSide;
       const bool beyond = !wraps && (window.x + i < 0 || window.x + i >= size.width);
@@ -180,6 +206,10 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
                   static_cast<std::size_t>(run) * 4);
       i += run;
     }
+  }
+  if (pending) {
+    pending_ = true;
+    return Error{ErrorCode::pending, description().name};
   }
   return image;
 }

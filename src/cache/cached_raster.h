@@ -29,6 +29,10 @@ class CachedRaster {
   const source::RasterDescription& description() const { return source_->description(); }
   source::RasterReader& reader() { return *reader_; }
 
+  /// Whether a read since the last call met blocks that are on their way, and what brings them.
+  /// Heights that are not there yet read as 0, so that all that is wanted is asked for at once; colours answer `pending`.
+  bool take_pending(source::Awaited& awaited);
+
   /// Bilinear heights at `pixels` (continuous, of level 0), from the samples of `level`.
   /// Between 0.5 pixels inside and the border the outermost samples are continued. NaN pixels: coverage 0.
   Result<void> sample_heights(int level, std::span<const glm::dvec2> pixels, std::span<HeightSample> heights);
@@ -62,6 +66,8 @@ class CachedRaster {
     Frozen<raster::HeightGrid> block;
   };
   std::vector<Held> held_;  ///< the last blocks used, few
+  bool pending_ = false;
+  std::vector<Held> absent_;  ///< zeros in the place of blocks on their way
 };
 
 }  // namespace tellurion::cache

@@ -14,7 +14,9 @@
 #include "globe/height_tables.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
+#include "fetch/byte_store.h"
 #include "source/gdal/gdal_source.h"
+#include "source/tiles/tiled_source.h"
 
 namespace tellurion::globe {
 namespace {
@@ -50,6 +52,23 @@ source::GdalOptions gdal_options(const LayerSpec& layer) {
   return options;
 }
 
+source::TileService tile_service(const LayerSpec& layer) {
+  const SourceSpec& source = layer.source;
+  source::TileService service;
+  service.url = source.url;
+  service.subdomains = source.subdomains;
+  for (const auto& [name, value] : source.headers) service.headers.push_back(name + ": " + value);
+  service.scheme = source.projection == "geographic" ? source::TileScheme::geographic : source::TileScheme::web_mercator;
+  service.kind = kind_of(layer.group);
+  service.code = raster::height_code(source.encoding);
+  service.tile_size = source.tile_size;
+  service.min_zoom = source.min_level;
+  service.max_zoom = source.max_level;
+  service.vertical = source.vertical;
+  service.bounds = source.bounds;
+  return service;
+}
+
 std::filesystem::path default_cache_folder() {
   if (const char* set = std::getenv("XDG_CACHE_HOME"); set && *set) return std::filesystem::path(set) / "tellurion";
   if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache" / "tellurion";
@@ -66,6 +85,7 @@ struct Globe::State {
   World world;
   GlobeOptions options;
   cache::BlockCache blocks;
+  std::shared_ptr<fetch::ByteStore> store;  ///< null: no layer needs it
   std::shared_ptr<const surface::SurfaceDescription> surface;
   std::vector<LayerInfo> layers;
 
@@ -77,8 +97,25 @@ struct Globe::State {
   std::unique_ptr<HeightTables> tables;
   std::unique_ptr<WorkerPool> pool;  ///< last: its threads end before what they use
 
+  Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
   void open_layers();
 };
+
+Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const LayerSpec& spec) {
+  if (spec.source.type == "xyz") {
+    if (!store) {
+      fetch::StoreOptions how;
+      if (!options.cache_folder.empty()) how.disk_file = options.cache_folder / "files.sqlite";
+      how.disk_bytes = options.disk_cache_bytes;
+      how.offline = options.offline;
+      store = std::make_shared<fetch::ByteStore>(how);
+    }
+    return source::open_tiles(tile_service(spec), world.ellipsoid, store);
+  }
+  source::GdalOptions how = gdal_options(spec);
+  if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
+  return source::open_gdal(how, world.ellipsoid);
+}
 
 void Globe::State::open_layers() {
   auto description = std::make_shared<surface::SurfaceDescription>();
@@ -89,9 +126,7 @@ void Globe::State::open_layers() {
     SourceStats stats;
     stats.name = spec.name;
     if (spec.enabled && is_drawn(spec.group)) {
-      source::GdalOptions how = gdal_options(spec);
-      if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
-      auto source = source::open_gdal(how, world.ellipsoid);
+      auto source = open_source(spec);
       if (source) {
         surface::Layer layer;
         layer.name = spec.name;
@@ -104,9 +139,9 @@ void Globe::State::open_layers() {
         info.raster = layer.source;
         (spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
       } else {
+        const std::string place = spec.line > 0 ? fmt::format("{}:{}: ", world.file.string(), spec.line) : "";
         stats.errors = 1;
-        stats.last_error = source.error().message;
-        info.error = source.error().message;
+        stats.last_error = info.error = place + source.error().message;
       }
     }
     layers.push_back(std::move(info));
@@ -169,11 +204,15 @@ std::vector<SourceStats> Globe::source_stats() const {
 }
 
 bool Globe::data_missing() const {
-  const std::vector<SourceStats> all = source_stats();
-  return std::any_of(all.begin(), all.end(), [](const SourceStats& source) { return source.errors > 0; });
+  for (std::size_t id = 0; id < state_->layers.size(); ++id) {
+    if (!state_->layers[id].error.empty() || state_->blocks.reads_of(static_cast<std::uint32_t>(id)).lost > 0) return true;
+  }
+  return false;
 }
 
 std::size_t Globe::memory_cache_bytes() const { return state_->blocks.bytes() + source::gdal_cache_bytes(); }
+std::size_t Globe::disk_cache_bytes() const { return state_->store ? state_->store->disk_bytes() : 0; }
+fetch::FetchStats Globe::fetch_stats() const { return state_->store ? state_->store->stats() : fetch::FetchStats{}; }
 std::size_t Globe::memory_budget_bytes() const { return state_->options.memory_cache_bytes; }
 
 view::Pose Globe::home() const {
@@ -245,6 +284,22 @@ struct HeightSampler::State {
   double half_circumference = 0;
 };
 
+namespace {
+
+/// The answer once all that it rests on is there; every round asks for at least one file more, and each ends in time.
+template <class Ask>
+auto with_data(surface::ElevationModel& model, const Ask& ask) {
+  for (;;) {
+    auto answer = ask();
+    source::Awaited awaited;
+    if (!model.take_pending(awaited)) return answer;
+    for (const auto& arrival : awaited) arrival->wait({});
+    if (awaited.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // another reader has asked for it
+  }
+}
+
+}  // namespace
+
 HeightSampler::HeightSampler(std::unique_ptr<State> state) : state_(std::move(state)) {}
 HeightSampler::HeightSampler(HeightSampler&&) noexcept = default;
 HeightSampler::~HeightSampler() = default;
@@ -258,14 +313,14 @@ Result<HeightSampler> Globe::height_sampler() const {
 
 Result<HeightSampler::Answer> HeightSampler::height_at(const geo::LatLon& place, HeightLookup lookup, Metres wanted_spacing) {
   const auto how = lookup == HeightLookup::nearest ? surface::Lookup::nearest : surface::Lookup::bilinear;
-  const auto found = state_->model.height_at(place, how, wanted_spacing.value);
+  const auto found = with_data(state_->model, [&] { return state_->model.height_at(place, how, wanted_spacing.value); });
   if (!found) return found.error();
   const bool known = std::isfinite(found->spacing);
   return Answer{EllipsoidalHeight(found->metres), known ? std::log2(state_->half_circumference / found->spacing) : -1.0};
 }
 
 Result<geo::Vector<geo::Ecef>> HeightSampler::normal_at(const geo::LatLon& place, Metres wanted_spacing) {
-  return state_->model.surface_normal_at(place, wanted_spacing.value);
+  return with_data(state_->model, [&] { return state_->model.surface_normal_at(place, wanted_spacing.value); });
 }
 
 }  // namespace tellurion::globe

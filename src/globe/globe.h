@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "fetch/fetcher.h"
 #include "geo/ellipsoid.h"
 #include "globe/frame_stats.h"
 #include "globe/world.h"
@@ -31,6 +32,8 @@ struct GlobeOptions {
   std::size_t memory_cache_bytes = std::size_t{512} << 20;  ///< decoded data, GDAL's block cache included
   int workers = -1;                                         ///< threads; 0: none, all on the calling thread; -1: by the machine
   std::filesystem::path cache_folder;                       ///< for kept tables; empty: nothing is kept
+  std::size_t disk_cache_bytes = std::size_t{4} << 30;      ///< of files from servers, in the cache folder
+  bool offline = false;                                     ///< no network: what the disk cache has counts, however old
   bool scan_heights = true;                                 ///< make error tables in the background
 };
 
@@ -87,9 +90,11 @@ class Globe {
   /// Sentences that a user should see: layers left out, data without a vertical datum.
   std::vector<std::string> hints() const;
   std::vector<SourceStats> source_stats() const;
-  /// Whether some data could not be read so far.
+  /// Whether some data could not be read and never will: what may still come does not count.
   bool data_missing() const;
   std::size_t memory_cache_bytes() const;
+  std::size_t disk_cache_bytes() const;
+  fetch::FetchStats fetch_stats() const;
   std::size_t memory_budget_bytes() const;
 
   /// Error tables of the height sources: made in the background, kept in the cache folder.

@@ -22,19 +22,35 @@ constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
+constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// What a worker made of a request.
+/// What a worker made of a request. Awaited: nothing yet, because these data are on their way.
 struct Finished {
   geo::TileKey key;
   Part part = Part::geometry;
-  std::variant<surface::TileGeometry, surface::TileImagery, Error> content;
+  std::variant<surface::TileGeometry, surface::TileImagery, source::Awaited, Error> content;
 };
 
 using FinishedQueue = BoundedQueue<Finished>;
+
+/// A part that is built once its data have come. Who drops it lets go of the data.
+struct WaitingPart {
+  geo::TileKey key;
+  Part part = Part::geometry;
+  source::Awaited awaited;
+  std::shared_ptr<std::atomic<std::size_t>> missing;
+};
+
+WaitingPart waiting_part(const geo::TileKey& key, Part part, source::Awaited awaited) {
+  WaitingPart waiting{key, part, std::move(awaited), std::make_shared<std::atomic<std::size_t>>(0)};
+  *waiting.missing = waiting.awaited.size();
+  for (const auto& arrival : waiting.awaited) arrival->then([missing = waiting.missing] { --*missing; });
+  return waiting;
+}
 
 /// The last height found under the eye; written by a worker, read by the render thread.
 struct GroundAnswer {
@@ -94,7 +110,8 @@ struct GlobeView::State {
   std::shared_ptr<FinishedQueue> finished;
   std::shared_ptr<GroundAnswer> ground = std::make_shared<GroundAnswer>();
   std::stop_source stop;
-  int in_flight = 0;
+  int in_flight = 0;        ///< parts that workers have
+  std::vector<WaitingPart> waiting;
   int roots_to_renew = 0;   ///< whose geometry was built by older facts and has not been asked for again
   int roots_renewing = 0;
   int max_in_flight = 0;
@@ -107,6 +124,7 @@ struct GlobeView::State {
   void ask(const surface::TileRequest& request);
   bool submit(const geo::TileKey& key, Part part);
   void renew_roots();
+  void resume_waiting();
   void take_over(double upload_ms);
   void take_over(Finished item);
   void wait_for_half(Clock::time_point deadline);
@@ -123,10 +141,12 @@ bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
     if (part == Part::geometry) {
       auto geometry = worker.build_geometry(surface, *facts, key, token);
       if (geometry) item.content = std::move(*geometry);
+      else if (geometry.error().code == ErrorCode::pending) item.content = worker.take_awaited();
       else item.content = geometry.error();
     } else {
       auto imagery = worker.build_colour(surface, key, token);
       if (imagery) item.content = std::move(*imagery);
+      else if (imagery.error().code == ErrorCode::pending) item.content = worker.take_awaited();
       else item.content = imagery.error();
     }
     queue->push(std::move(item));
@@ -140,6 +160,20 @@ void GlobeView::State::renew_roots() {
     ++roots_renewing;
     ++in_flight;
   }
+}
+
+/// Builds those whose data have come; drops those that no recent frame wanted. Roots are always wanted.
+void GlobeView::State::resume_waiting() {
+  std::erase_if(waiting, [&](const WaitingPart& part) {
+    if (*part.missing == 0 && submit(part.key, part.part)) {
+      ++in_flight;
+      return true;
+    }
+    if (part.key.level == 0 || tree.is_wanted(part.key, part.part)) return false;
+    tree.cancelled(part.key, part.part);
+    ++stats.requests_cancelled;
+    return true;
+  });
 }
 
 void GlobeView::State::ask(const surface::TileRequest& request) {
@@ -172,6 +206,11 @@ Result<void> GlobeView::State::upload(const Finished& item) {
 
 void GlobeView::State::take_over(Finished item) {
   --in_flight;
+  if (auto* awaited = std::get_if<source::Awaited>(&item.content)) {
+    if (awaited->empty() && item.key.level > 0) return tree.cancelled(item.key, item.part);  // another part has asked for them
+    waiting.push_back(waiting_part(item.key, item.part, std::move(*awaited)));
+    return;
+  }
   if (item.key.level == 0 && item.part == Part::geometry && roots_renewing > 0) --roots_renewing;
   Result<void> result;
   if (const Error* error = std::get_if<Error>(&item.content)) result = *error;
@@ -205,6 +244,10 @@ void GlobeView::State::take_over(double upload_ms) {
 
 /// Takes over half of what is in flight: to select anew after every tile would take longer than to build it.
 void GlobeView::State::wait_for_half(Clock::time_point deadline) {
+  if (in_flight == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // nothing to do until data arrive
+    return;
+  }
   const int enough = in_flight / 2;
   do {
     globe.run_one();
@@ -219,6 +262,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   const auto start = Clock::now();
   globe.run_one();
   take_over(upload_ms);
+  resume_waiting();
   stats.upload_ms = ms_since(start);
 
   if (auto latest = globe.facts(); latest != facts) {
@@ -232,7 +276,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.select_ms = ms_since(before_select);
 
   for (const surface::TileRequest& request : selection->requests) {
-    if (in_flight >= max_in_flight) break;
+    if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting) break;
     ask(request);
   }
 
@@ -249,6 +293,8 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
+  stats.bytes_fetched = globe.fetch_stats().bytes;
+  stats.disk_cache_bytes = static_cast<std::int64_t>(globe.disk_cache_bytes());
   stats.draw_ms = 0;
   stats.draws = 0;
   stats.triangles = 0;
@@ -278,6 +324,7 @@ Result<void> GlobeView::State::load_roots() {
       ++missing;
     }
   }
+  std::vector<WaitingPart> late;
   while (missing > 0) {
     globe.run_one();
     auto item = finished->pop_until(std::min(deadline, Clock::now() + std::chrono::milliseconds(20)));
@@ -287,14 +334,17 @@ Result<void> GlobeView::State::load_roots() {
       continue;
     }
     --missing;
-    if (item->part == Part::geometry && std::holds_alternative<Error>(item->content)) {
-      // Unreadable heights must not leave a hole: a bare ellipsoid stands in.
+    if (item->part == Part::geometry && (std::holds_alternative<Error>(item->content) || std::holds_alternative<source::Awaited>(item->content))) {
+      // Heights that cannot be read, or not yet, must not leave a hole: a bare ellipsoid stands in.
       auto bare = build_bare(item->key);
       if (!bare) return bare.error();
+      if (auto* awaited = std::get_if<source::Awaited>(&item->content)) late.push_back(waiting_part(item->key, item->part, std::move(*awaited)));
       item->content = std::move(*bare);
     }
     take_over(std::move(*item));
   }
+  roots_renewing = static_cast<int>(late.size());
+  for (WaitingPart& part : late) waiting.push_back(std::move(part));
   return {};
 }
 
@@ -351,7 +401,7 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;
-    const bool idle = s.in_flight == 0 && s.roots_to_renew == 0 && s.selection->requests.empty();
+    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.selection->requests.empty() && !s.selection->stats.retries_later;
     if (idle && s.facts == s.globe.facts()) return false;  // the rest has failed for good
     const auto now = Clock::now();
     if (now >= deadline) return false;

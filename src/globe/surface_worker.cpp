@@ -30,14 +30,18 @@ Result<surface::TileGeometry> SurfaceWorker::build_geometry(std::shared_ptr<cons
                                                             const surface::SurfaceFacts& facts, const geo::TileKey& key, std::stop_token stop) {
   const auto model = elevation(std::move(surface));
   if (!model) return model.error();
-  return surface::build_geometry(**model, facts, key, {}, stop);
+  auto geometry = surface::build_geometry(**model, facts, key, {}, stop);
+  if ((*model)->take_pending(awaited_)) return Error{ErrorCode::pending, "geometry of " + geo::to_string(key)};
+  return geometry;
 }
 
 Result<surface::TileImagery> SurfaceWorker::build_colour(std::shared_ptr<const surface::SurfaceDescription> surface,
                                                          const geo::TileKey& key, std::stop_token stop) {
   const auto model = model_of(colours_, std::move(surface), cache_);
   if (!model) return model.error();
-  return surface::build_imagery(**model, key, stop);
+  auto imagery = surface::build_imagery(**model, key, stop);
+  if ((*model)->take_pending(awaited_)) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
+  return imagery;
 }
 
 }  // namespace tellurion::globe

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <utility>
 
 #include "base/result.h"
 #include "cache/block_cache.h"
@@ -24,6 +25,8 @@ class SurfaceWorker {
                                                const surface::SurfaceFacts& facts, const geo::TileKey& key, std::stop_token stop);
   Result<surface::TileImagery> build_colour(std::shared_ptr<const surface::SurfaceDescription> surface, const geo::TileKey& key,
                                             std::stop_token stop);
+  /// What the last build that answered `pending` waits for. Empty: another build has asked for it; it comes with that.
+  source::Awaited take_awaited() { return std::exchange(awaited_, {}); }
   /// The readers of the height layers, for other questions.
   Result<surface::ElevationModel*> elevation(std::shared_ptr<const surface::SurfaceDescription> surface);
 
@@ -31,6 +34,7 @@ class SurfaceWorker {
   cache::BlockCache& cache_;
   std::optional<surface::ElevationModel> elevation_;
   std::optional<surface::ColourModel> colours_;
+  source::Awaited awaited_;
 };
 
 }  // namespace tellurion::globe

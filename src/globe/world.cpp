@@ -1,6 +1,7 @@
 #include "globe/world.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <initializer_list>
@@ -11,12 +12,16 @@
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
+#include "fetch/transfer.h"
 #include "geo/body.h"
+#include "raster/height_codes.h"
 
 namespace tellurion::globe {
 namespace {
 
 constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
+
+bool is_web_address(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
 /// Reads the tables of one world file; the first mistake is kept, what follows it is ignored.
 class WorldReader {
@@ -92,15 +97,17 @@ class WorldReader {
     } else {
       fail(table, "the layer has no `source`");
     }
-    layer.name = text(table, "name").value_or(layer.source.path.stem().string());
+    const std::string unnamed = layer.source.type == "xyz" ? fetch::public_part(layer.source.url) : layer.source.path.stem().string();
+    layer.name = text(table, "name").value_or(unnamed);
     return layer;
   }
 
   void read_source(const toml::table& table, SourceSpec& source) {
     source.type = text(table, "type").value_or("gdal");
+    if (source.type == "xyz") return read_tiles(table, source);
     if (source.type != "gdal") {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("this build reads sources of type \"gdal\" only, not \"{}\"", source.type), ErrorCode::unsupported);
+                  fmt::format("this build reads sources of type \"gdal\" and \"xyz\" only, not \"{}\"", source.type), ErrorCode::unsupported);
     }
     expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
     if (const auto path = text(table, "path"); path && !path->empty()) {
@@ -125,6 +132,52 @@ class WorldReader {
       }
       if (good) source.bands = rgb;
       else fail(*bands, "`bands` must be [red, green, blue], numbers from 1");
+    }
+  }
+
+  void read_tiles(const toml::table& table, SourceSpec& source) {
+    expect_keys(table, "source", {"type", "url", "subdomains", "headers", "projection", "encoding", "tile_size", "min_level", "max_level", "bounds", "vertical"});
+    source.url = text(table, "url").value_or("");
+    if (!is_web_address(source.url)) fail(table, "the source needs a `url` of http:// or https://, for example \"http://host/{z}/{x}/{y}.png\"");
+    source.vertical = text(table, "vertical");
+    source.projection = text(table, "projection").value_or("web-mercator");
+    if (source.projection != "web-mercator" && source.projection != "geographic")
+      fail(*table.get("projection"), "`projection` is \"web-mercator\" or \"geographic\"");
+    source.encoding = text(table, "encoding").value_or("");
+    if (!source.encoding.empty() && !raster::height_code(source.encoding))
+      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is terrarium, terrain-rgb or centimetres; without one, heights are the first band's numbers", source.encoding));
+    source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
+    source.min_level = static_cast<int>(number(table, "min_level", 0, 30).value_or(0));
+    source.max_level = static_cast<int>(number(table, "max_level", 0, 30).value_or(18));
+    if (const toml::node* bounds = table.get("bounds")) {
+      std::array<double, 4> edges{};
+      const toml::array* list = bounds->as_array();
+      bool good = list && list->size() == 4;
+      for (std::size_t i = 0; good && i < 4; ++i) {
+        const auto edge = (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
+        good = edge && std::abs(*edge) <= (i % 2 == 0 ? 180.0 : 90.0);
+        if (good) edges[i] = *edge;
+      }
+      if (good && edges[0] < edges[2] && edges[1] < edges[3]) source.bounds = edges;
+      else fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
+    }
+    if (const toml::node* list = table.get("subdomains")) {
+      const toml::array* names = list->as_array();
+      if (!names) return fail(*list, "`subdomains` is a list of texts: [\"a\", \"b\"]");
+      for (const toml::node& name : *names) {
+        if (const auto value = name.value_exact<std::string>()) source.subdomains.push_back(*value);
+        else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
+      }
+    }
+    if (const toml::node* headers = table.get("headers")) {
+      const toml::table* fields = headers->as_table();
+      if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
+      for (const auto& [name, value] : *fields) {
+        const auto content = value.value_exact<std::string>();
+        const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
+        if (good) source.headers.emplace(name.str(), *content);
+        else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
+      }
     }
   }
 
@@ -177,6 +230,33 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   toml::table table;
   table.is_inline(true);
   table.insert("type", source.type);
+  if (source.type == "xyz") {
+    const SourceSpec usual;
+    table.insert("url", source.url);
+    if (!source.subdomains.empty()) {
+      toml::array names;
+      for (const std::string& name : source.subdomains) names.push_back(name);
+      table.insert("subdomains", std::move(names));
+    }
+    if (!source.headers.empty()) {
+      toml::table fields;
+      fields.is_inline(true);
+      for (const auto& [name, value] : source.headers) fields.insert(name, value);
+      table.insert("headers", std::move(fields));
+    }
+    if (source.projection != usual.projection) table.insert("projection", source.projection);
+    if (!source.encoding.empty()) table.insert("encoding", source.encoding);
+    if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
+    if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
+    if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
+    if (source.bounds) {
+      toml::array edges;
+      for (const double edge : *source.bounds) edges.push_back(edge);
+      table.insert("bounds", std::move(edges));
+    }
+    if (source.vertical) table.insert("vertical", *source.vertical);
+    return table;
+  }
   const auto relative = source.path.lexically_relative(folder);
   const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
   table.insert("path", (inside ? relative : source.path).generic_string());

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,6 +31,17 @@ struct SourceSpec {
   std::optional<double> scale;
   std::optional<double> offset;
   std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
+
+  // Of type "xyz"; there `path` is empty.
+  std::string url;                          ///< see source::TileTemplate
+  std::vector<std::string> subdomains;
+  std::map<std::string, std::string> headers;
+  std::string projection = "web-mercator";  ///< or "geographic"
+  std::string encoding;                     ///< of heights: see raster::height_code; empty: the first band's numbers
+  int tile_size = 256;
+  int min_level = 0;
+  int max_level = 18;
+  std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees
 };
 
 struct LayerSpec {

@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include "geo/body.h"
+#include "fetch/transfer.h"
 #include "source/gdal/raster_body.h"
+#include "source/tiles/tile_template.h"
 
 namespace tellurion::globe {
 namespace {
@@ -64,12 +66,27 @@ Result<World> world_of_raster(const std::filesystem::path& file) {
   return world;
 }
 
+/// Tiles of colours over the default world.
+Result<World> world_of_tiles(const std::string& url) {
+  if (const auto address = source::TileTemplate::parse(url, {}); !address) return Error{address.error().code, fmt::format("{}: {}", fetch::public_part(url), address.error().message)};
+  auto world = default_world();
+  if (!world) return world.error();
+  world->file.clear();
+  LayerSpec layer;
+  layer.name = fetch::public_part(url);
+  layer.source.type = "xyz";
+  layer.source.url = url;
+  world->layers.push_back(std::move(layer));
+  return world;
+}
+
 }  // namespace
 
 Result<World> resolve_world(const std::string& argument) {
   if (argument.empty()) return default_world();
+  if (argument.starts_with("http://") || argument.starts_with("https://")) return world_of_tiles(argument);
   if (argument.find("://") != std::string::npos)
-    return Error{ErrorCode::unsupported, fmt::format("{}: this build reads no network sources: give a world file or a raster", argument)};
+    return Error{ErrorCode::unsupported, fmt::format("{}: tiles come by http:// or https:// only", argument)};
   const std::filesystem::path file(argument);
   if (file.extension() == ".toml") return load_world(file);
   return world_of_raster(file);

@@ -139,7 +139,8 @@ Compositor::Scratch& Compositor::scratch_for(gpu::RenderThread& thread, const ra
     glBindTexture(GL_TEXTURE_2D, s.texture.name());
     return s;
   }
-  if (scratch_.size() == kMaxScratch) {
+  const Scratch wanted{width, height, use_, gpu::Texture()};
+  while (scratch_.size() == kMaxScratch || (!scratch_.empty() && !budget.fits(wanted.bytes()))) {
     const auto oldest = std::min_element(scratch_.begin(), scratch_.end(),
                                          [](const Scratch& a, const Scratch& b) { return a.last_use < b.last_use; });
     budget.used -= oldest->bytes();

@@ -12,6 +12,7 @@
 
 #include "base/quantity.h"
 #include "base/result.h"
+#include "fetch/arrival.h"
 #include "geo/ellipsoid.h"
 #include "geo/tile_key.h"
 #include "raster/height_grid.h"
@@ -41,6 +42,7 @@ struct RasterDescription {
   SampleKind kind = SampleKind::colour;  ///< what it looks like, unless the world file says otherwise
   std::vector<LevelSize> levels;   ///< level 0 is the full raster; every further one about half of the one before, down to
                                    ///< one that fits into a block. Levels that the file lacks are made when read.
+  bool is_remote = false;          ///< its samples come over a network: not to be read as a whole
   bool wraps = false;              ///< columns go round the body: column `width` is column 0 again
   int band_count = 0;
   std::string sample_type;         ///< "Int16", "Byte", ...
@@ -64,13 +66,16 @@ class Coverage {
   virtual Metres spacing_under(const geo::TileKey& tile) const = 0;
 };
 
+/// Bytes on their way.
+using Awaited = std::vector<std::shared_ptr<fetch::Arrival>>;
+
 /// One thread's access to a raster. Not thread-safe; made and used on one worker.
 class RasterReader {
  public:
   virtual ~RasterReader() = default;
 
   /// Heights above the world's ellipsoid (scale, offset and vertical datum applied), NaN where there is no data.
-  /// `window` lies wholly within the level. Errors: unavailable, corrupt, naming the file.
+  /// `window` lies wholly within the level. Errors: unavailable, corrupt, naming the file; pending (see take_awaited).
   virtual Result<raster::HeightGrid> read_heights(int level, const PixelWindow& window) = 0;
 
   /// Colours, premultiplied by alpha; alpha 0 where there is no data. `window` lies wholly within the level.
@@ -79,6 +84,9 @@ class RasterReader {
   /// Continuous pixel coordinates of level 0 (pixel (i, j) covers [i, i+1) x [j, j+1)); NaN where a place cannot be projected.
   /// Longitudes are brought into the raster's own range; with `wraps` x lies in [0, width). Sizes are equal (asserted).
   virtual void to_pixels(std::span<const geo::LatLon> places, std::span<glm::dvec2> pixels) = 0;
+
+  /// What reads that answered `pending` wait for, since the last call: not to be let go of while it is wanted.
+  virtual Awaited take_awaited() { return {}; }
 
   /// The reverse; NaN where there is no such place.
   virtual void to_places(std::span<const glm::dvec2> pixels, std::span<geo::LatLon> places) = 0;

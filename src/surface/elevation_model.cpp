@@ -160,6 +160,16 @@ struct ElevationModel::LatticeBatch final : Batch {
   std::vector<glm::dvec2>& room;
 };
 
+bool ElevationModel::take_pending(source::Awaited& awaited) {
+  bool pending = false;
+  for (HeightLayer& layer : layers_) {
+    if (!layer.raster.take_pending(awaited)) continue;
+    pending = true;
+    layer.beyond.clear();  // may have been made of zeros
+  }
+  return pending;
+}
+
 std::span<const std::uint32_t> ElevationModel::all_of(std::size_t count) {
   for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(static_cast<std::uint32_t>(i));
   return std::span(numbers_).first(count);

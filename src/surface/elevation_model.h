@@ -73,6 +73,9 @@ class ElevationModel {
   /// Unit normal of the elevation surface (bilinear) at `place`, ECEF.
   Result<geo::Vector<geo::Ecef>> surface_normal_at(const geo::LatLon& place, double wanted_spacing = 0);
 
+  /// Whether an answer since the last call rests on samples that are on their way and stand in as 0; and what brings them.
+  bool take_pending(source::Awaited& awaited);
+
   /// The enabled height layers' rasters, lowest first, and the settings of each.
   std::size_t layer_count() const { return layers_.size(); }
   const Layer& layer(std::size_t i) const { return *layers_[i].settings; }

@@ -376,7 +376,7 @@ class Scanner {
 
 bool is_scanned(const Layer& layer) {
   const source::LevelSize& size = layer.source->description().levels.front();
-  return layer.enabled && static_cast<double>(size.width) * size.height <= kMostScannedSamples;
+  return layer.enabled && !layer.source->description().is_remote && static_cast<double>(size.width) * size.height <= kMostScannedSamples;
 }
 
 double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {

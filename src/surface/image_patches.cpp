@@ -256,8 +256,15 @@ Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> 
   return model;
 }
 
+bool ColourModel::take_pending(source::Awaited& awaited) {
+  bool pending = false;
+  for (ColourLayer& layer : layers_) pending = layer.raster.take_pending(awaited) || pending;
+  return pending;
+}
+
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
   std::vector<ImagePatch> from_the_top;
+  bool pending = false;
   for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
     const Layer& settings = *layer->settings;
     if (!settings.source->coverage().touches(key)) continue;
@@ -268,6 +275,10 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
     for (const ControlGrid& grid : mapping.grids) {
       if (stop.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key)};
       Result<ImagePatch> patch = make_patch(layer->raster, key, grid, closed);
+      if (!patch && patch.error().code == ErrorCode::pending) {
+        pending = true;  // taken for opaque: what lies below is asked for once it shows
+        continue;
+      }
       if (!patch) return patch.error();
       if (patch->image.rgba.empty()) {
         hides_all_below = false;
@@ -282,6 +293,7 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
     }
     if (hides_all_below) break;
   }
+  if (pending) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
   TileImagery imagery;
   imagery.patches.assign(std::make_move_iterator(from_the_top.rbegin()), std::make_move_iterator(from_the_top.rend()));
   return imagery;

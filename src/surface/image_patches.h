@@ -20,6 +20,9 @@ class ColourModel {
 
   const SurfaceDescription& description() const { return *description_; }
 
+  /// Whether a build since the last call met pixels that are on their way (it answered `pending`), and what brings them.
+  bool take_pending(source::Awaited& awaited);
+
  private:
   friend Result<TileImagery> build_imagery(ColourModel&, const geo::TileKey&, std::stop_token);
 
@@ -37,7 +40,7 @@ class ColourModel {
 /// The patches of all layers that touch the tile, lowest first; layers wholly hidden by opaque ones above are left out.
 /// Between control points places err by less than a third of a texel; round a pole of the source, where none could do that, the
 /// slot's own texels are sampled here. Windows have about one to two pixels a texel on either axis, at most kLargestWindow on a side.
-/// Errors: those of reading, cancelled.
+/// Errors: those of reading, cancelled; pending, once all that is wanted has been asked for.
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop = {});
 
 inline constexpr int kLargestWindow = 1024;  ///< pixels

@@ -56,10 +56,14 @@ void NodePool::learn(Node& node) const {
 
 void NodePool::set_facts(std::shared_ptr<const SurfaceFacts> facts) {
   facts_ = std::move(facts);
-  for (Node& root : roots_) learn(root);
+  const auto renew = [&](Node& node) {
+    learn(node);
+    if (node.resident(Part::geometry) == nullptr) node.built.reset();
+  };
+  for (Node& root : roots_) renew(root);
   for (Quad& quad : quads_) {
     if (!quad.in_use) continue;
-    for (Node& node : quad.nodes) learn(node);
+    for (Node& node : quad.nodes) renew(node);
   }
 }
 

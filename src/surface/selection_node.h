@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "geo/ellipsoid.h"
@@ -45,7 +46,7 @@ struct Node {
   TileFacts facts;
   float full_grid_error = 0;    ///< full_grid_curvature_error
   std::array<NodePart, kPartCount> parts;
-  std::uint32_t mesh_bytes = 0; ///< of its geometry as last built; 0 if it never was
+  std::optional<Resident> built;  ///< its geometry as last built with these facts, there or not: a cut must not forget what it learnt
 
   // Bounds, kept as long as the heights stay.
   OrientedBox box;

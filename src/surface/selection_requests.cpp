@@ -13,8 +13,10 @@ constexpr int kLevelsBetweenSteps = 3;
 void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& requests, SelectionStats& stats) {
   requests_.clear();
   stats.tiles_waiting = 0;
+  retries_later_ = false;
   stats.selected_by_level.clear();
   for (Node& root : pool_.roots()) collect(frame, root, nullptr, stats);
+  stats.retries_later = retries_later_;
   const auto order = [](const TileRequest& a, const TileRequest& b) {
     return std::tie(b.gain_px, a.key, a.part) < std::tie(a.gain_px, b.key, b.part);
   };
@@ -27,6 +29,7 @@ void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& re
 void RequestList::want(const SelectionFrame& frame, Node& node, Part part, double gain_px) {
   NodePart& wanted = node.part(part);
   wanted.wanted = frame.number;
+  if (const auto* failed = std::get_if<Failed>(&wanted.life)) retries_later_ = retries_later_ || failed->retry_at != TimePoint::max();
   if (!can_request(wanted.life, frame.now)) return;
   const std::size_t p = index_of(part);
   if (node.requested[p] == frame.number) {

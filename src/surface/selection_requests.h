@@ -28,6 +28,7 @@ class RequestList {
   void want(const SelectionFrame& frame, Node& node, Part part, double gain_px);
 
   NodePool& pool_;
+  bool retries_later_ = false;
   std::vector<TileRequest> requests_;
 };
 

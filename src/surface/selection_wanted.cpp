@@ -18,14 +18,14 @@ struct HeightRange {
   double highest = 0;
 };
 
-/// Bounds of the displayed heights. Where facts give no error a tile is judged once it is resident, and then by its own
+/// Bounds of the displayed heights. Where facts give no error a tile is judged once it has been built, and then by its own
 /// range; cut to the facts' range, so that what was culled before it arrived is culled after.
 HeightRange heights_of(const Node& node, double exaggeration) {
   double lowest = node.facts.min_height;
   double highest = node.facts.max_height;
-  if (const Resident* geometry = node.resident(Part::geometry); geometry != nullptr && !node.facts.height_error) {
-    lowest = std::clamp<double>(geometry->metrics.min_height, lowest, highest);
-    highest = std::clamp<double>(geometry->metrics.max_height, lowest, highest);
+  if (node.built && !node.facts.height_error) {
+    lowest = std::clamp<double>(node.built->metrics.min_height, lowest, highest);
+    highest = std::clamp<double>(node.built->metrics.max_height, lowest, highest);
   }
   return {lowest * exaggeration, highest * exaggeration};
 }
@@ -37,9 +37,8 @@ void inherit_owners(Node& node) {
   node.colour_shown = parent == nullptr || (node.facts.own_colour && has_colour) ? &node : parent->colour_shown;
 
   // An owner that turned out to hold no slopes passes the question on.
-  const Resident* geometry = node.resident(Part::geometry);
-  const bool owns_slopes = node.facts.own_slopes && (geometry == nullptr || geometry->has_slopes);
-  const bool has_slopes = owns_slopes && geometry != nullptr;
+  const bool owns_slopes = node.facts.own_slopes && (!node.built || node.built->has_slopes);
+  const bool has_slopes = owns_slopes && node.resident(Part::geometry) != nullptr;
   node.slope_owner = parent == nullptr || owns_slopes ? &node : parent->slope_owner;
   node.slope_shown = parent == nullptr || has_slopes ? &node : parent->slope_shown;
 }
@@ -79,16 +78,15 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
   node.planes = *planes;
   inherit_owners(node);
 
-  const Resident* geometry = node.resident(Part::geometry);
-  node.error_known = node.facts.height_error.has_value() || geometry != nullptr;
+  node.error_known = node.facts.height_error.has_value() || node.built.has_value();
   node.error_m = node.bound_m = 0;
   if (node.facts.height_error) {
     const DisplayedError full = displayed_error(frame.errors, {*node.facts.height_error, node.full_grid_error}, node.facts.max_height);
     node.error_m = full.judged;
     node.bound_m = full.bound;
   }
-  if (geometry != nullptr) {
-    const TileMetrics& built = geometry->metrics;
+  if (node.built) {
+    const TileMetrics& built = node.built->metrics;
     const DisplayedError finest = displayed_error(frame.errors, built.steps.front(), built.max_height);
     node.error_m = std::max(node.error_m, finest.judged);
     node.bound_m = std::max(node.bound_m, finest.bound);
@@ -143,11 +141,11 @@ void WantedCut::refine(const SelectionFrame& frame, Node& node) {
   node.split = wants_split(frame, node);
   if (!node.split) {
     ++selected_;
-    if (node.mesh_bytes > 0) {
+    if (node.built) {
       ++selected_built_;
-      selected_mesh_bytes_ += node.mesh_bytes;
+      selected_mesh_bytes_ += node.built->metrics.mesh_bytes;
     }
-    selected_bytes_ += bytes_of_tile(node.facts, node.mesh_bytes > 0 ? node.mesh_bytes : typical_mesh_bytes_);
+    selected_bytes_ += bytes_of_tile(node.facts, node.built ? node.built->metrics.mesh_bytes : typical_mesh_bytes_);
   } else if (within(frame.settings, kHopelessFactor)) {
     pool_.add_children(node);
     for (int i = 0; i < 4; ++i) refine(frame, node.children[i]);

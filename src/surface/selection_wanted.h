@@ -29,7 +29,8 @@ SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const Sele
 /// know it, so levels are skipped; where they do not, the tile itself has to be resident, and a tile of which nothing is
 /// known yet ends the cut until it is. Built metrics also count where facts said that the tile is good enough. So once
 /// everything wanted is resident, the cut depends on camera, settings, facts and metrics only.
-/// A mesh's size is remembered when it goes: a cut that turned out too large is not tried again and again.
+/// What was built is remembered when it goes, its errors and its size: a cut that turned out too coarse or too large is not
+/// tried again and again.
 class WantedCut {
  public:
   WantedCut(NodePool& pool, std::array<UseOrder, kPartCount>& orders) : pool_(pool), orders_(orders) {}

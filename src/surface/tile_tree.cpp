@@ -84,8 +84,8 @@ void TileTree::cancelled(const geo::TileKey& key, Part part) { state_->happens(s
 
 void TileTree::arrived_geometry(const geo::TileKey& key, const TileMetrics& metrics, bool has_slopes) {
   Node& node = state_->pool.at(key);
-  node.mesh_bytes = metrics.mesh_bytes;
-  state_->happens(node, Part::geometry, Arrive{{metrics, has_slopes}});
+  node.built = Resident{metrics, has_slopes};
+  state_->happens(node, Part::geometry, Arrive{*node.built});
 }
 
 void TileTree::arrived_colour(const geo::TileKey& key) {

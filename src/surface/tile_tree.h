@@ -51,6 +51,7 @@ struct SelectionStats {
   std::vector<int> drawn_by_level;
   double max_error_px = 0;        ///< largest error of a drawn tile
   double effective_sse_px = 0;    ///< the wanted error after the rule of max_tiles and max_bytes
+  bool retries_later = false;     ///< something wanted failed and will be asked for again
   bool complete = false;          ///< the drawn cut is the selected cut with all its parts, and no transition is under way
 };
 

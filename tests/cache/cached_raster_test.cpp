@@ -22,6 +22,10 @@ class FormulaSource final : public source::RasterSource, source::Coverage {
     if (level == 0 && x == 100 && y == 50) return raster::kNoHeight;
     return static_cast<float>((x * 7919 + y * 104729) % 1000 + level * 10000);
   }
+  /// Blocks of level 0 are on their way until then.
+  bool arrived = true;
+  mutable int asked = 0;
+
   static std::array<std::uint8_t, 4> colour(int x, int y) {
     return {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(x >> 8), static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(y >> 8)};
   }
@@ -31,11 +35,20 @@ class FormulaSource final : public source::RasterSource, source::Coverage {
   std::string revision() const override { return "formula"; }
   bool touches(const geo::TileKey&) const override { return true; }
   Metres spacing_under(const geo::TileKey&) const override { return Metres(1.0); }
-  Result<std::unique_ptr<source::RasterReader>> open_reader() const override { return std::unique_ptr<source::RasterReader>(new Reader); }
+  Result<std::unique_ptr<source::RasterReader>> open_reader() const override { return std::unique_ptr<source::RasterReader>(new Reader(*this)); }
 
  private:
   struct Reader final : source::RasterReader {
+    explicit Reader(const FormulaSource& s) : source(s) {}
+
+    Error on_its_way() {
+      ++source.asked;
+      awaited.push_back(std::make_shared<fetch::Arrival>());
+      return {ErrorCode::pending, "formula"};
+    }
+    source::Awaited take_awaited() override { return std::exchange(awaited, {}); }
     Result<raster::HeightGrid> read_heights(int level, const source::PixelWindow& w) override {
+      if (!source.arrived) return on_its_way();
       raster::HeightGrid grid{w.width, w.height, {}};
       for (int y = w.y; y < w.y + w.height; ++y) {
         for (int x = w.x; x < w.x + w.width; ++x) grid.metres.push_back(height(level, x, y));
@@ -43,6 +56,7 @@ class FormulaSource final : public source::RasterSource, source::Coverage {
       return grid;
     }
     Result<raster::Image> read_colours(int, const source::PixelWindow& w) override {
+      if (!source.arrived) return on_its_way();
       raster::Image image{w.width, w.height, {}};
       for (int y = w.y; y < w.y + w.height; ++y) {
         for (int x = w.x; x < w.x + w.width; ++x) {
@@ -54,6 +68,9 @@ class FormulaSource final : public source::RasterSource, source::Coverage {
     }
     void to_pixels(std::span<const geo::LatLon>, std::span<glm::dvec2>) override {}
     void to_places(std::span<const glm::dvec2>, std::span<geo::LatLon>) override {}
+
+    const FormulaSource& source;
+    source::Awaited awaited;
   };
   source::RasterDescription about_;
 };
@@ -193,4 +210,35 @@ TEST_CASE("sample_heights: a cache without any room still gives right answers") 
   BlockCache cache(0);
   CachedRaster raster = CachedRaster::open(source, cache, 1).value();
   for (int i = 0; i < 700; ++i) CHECK(raster.nearest_height({i + 0.5, (i % 300) + 0.5}).value().metres == FormulaSource::height(0, i, i % 300));
+}
+
+TEST_CASE("CachedRaster: what is on its way is asked for all at once, and read when it is there") {
+  FormulaSource source(false);
+  source.arrived = false;
+  BlockCache cache(std::size_t{16} << 20);
+  CachedRaster raster = std::move(CachedRaster::open(source, cache, 3)).value();
+  // The corner of four blocks, and one more.
+  const std::vector<glm::dvec2> pixels{{256.0, 256.0}, {10.0, 10.0}, {600.0, 20.0}};
+  std::vector<HeightSample> heights(pixels.size());
+  REQUIRE(raster.sample_heights(0, pixels, heights));
+  for (const HeightSample& height : heights) CHECK(height.coverage == 1.0);  // so that nothing below is asked for meanwhile
+  CHECK(source.asked == 5);
+  source::Awaited awaited;
+  CHECK(raster.take_pending(awaited));
+  CHECK(awaited.size() == 5);
+  CHECK_FALSE(raster.take_pending(awaited));
+
+  const auto image = raster.read_colours(0, {200, 200, 100, 100});
+  REQUIRE_FALSE(image);
+  CHECK(image.error().code == ErrorCode::pending);
+  awaited.clear();
+  CHECK(raster.take_pending(awaited));
+  CHECK(awaited.size() == 4);
+  CHECK(cache.reads_of(3).errors == 0);
+
+  source.arrived = true;
+  REQUIRE(raster.sample_heights(0, pixels, heights));
+  CHECK_FALSE(raster.take_pending(awaited));
+  for (std::size_t i = 0; i < pixels.size(); ++i) CHECK(heights[i].metres == doctest::Approx(expected(0, pixels[i], false).metres));
+  CHECK(raster.read_colours(0, {200, 200, 100, 100}));
 }

@@ -31,7 +31,7 @@ def run_on_display_in_memory():
         print(f"skipped: {', '.join(missing)} missing (tools/setup.sh --test installs them)")
         sys.exit(77)
     os.environ["TELLURION_ON_XVFB"] = "1"
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24 -nolisten tcp -r", sys.executable, *sys.argv])
+    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24 -nolisten tcp -noreset -r", sys.executable, *sys.argv])
 
 
 def ask_to_close(window):

@@ -29,7 +29,7 @@ multiplier = 1.5
 enabled = false
 )";
 
-std::string message_of(const char* text) {
+std::string message_of(const std::string& text) {
   const auto world = parse_world(text, "/worlds", "w.toml");
   REQUIRE_FALSE(world);
   return world.error().message;
@@ -89,7 +89,42 @@ TEST_CASE("parse_world: mistakes name the file and the line") {
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[layer]\ngroup = \"color\"\n"), "two brackets"));
   CHECK(contains(message_of("[[layer]]\ngroup = \n"), "w.toml:2: not valid TOML"));
-  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"xyz\", url = \"u\" }\n"), "\"xyz\""));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"wms\", url = \"u\" }\n"), "\"wms\""));
+  const auto tiles = [](const std::string& more) {
+    return message_of("[[layer]]\ngroup = \"height\"\nsource = { type = \"xyz\", url = \"http://h/{z}/{x}/{y}.png\"" + more + " }\n");
+  };
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"xyz\", url = \"u\" }\n"), "w.toml:3: the source needs a `url`"));
+  CHECK(contains(tiles(", encoding = \"morse\""), "w.toml:3: no encoding is called \"morse\""));
+  CHECK(contains(tiles(", projection = \"flat\""), "`projection`"));
+  CHECK(contains(tiles(", bounds = [3, 0, 1, 2]"), "`bounds`"));
+  CHECK(contains(tiles(", headers = { A = \"b\\nc\" }"), "the header `A`"));
+  CHECK(contains(tiles(", path = \"x\""), "no key `path`"));
+}
+
+TEST_CASE("to_toml: a source of tiles comes back with all that was said of it") {
+  const std::string text =
+      "[[layer]]\nname = \"dem\"\ngroup = \"height\"\nsource = { type = \"xyz\", url = \"https://{s}.host/{z}/{x}/{-y}.webp?key=1\", subdomains = [\"a\", \"b\"], "
+      "headers = { Authorization = \"secret\" }, projection = \"geographic\", encoding = \"terrarium\", tile_size = 512, min_level = 1, max_level = 9, "
+      "bounds = [-10.5, -20, 30, 40], vertical = \"egm96\" }\n";
+  const auto first = parse_world(text, "/folder", "w.toml");
+  REQUIRE(first);
+  const auto second = parse_world(to_toml(*first), "/folder", "w.toml");
+  REQUIRE(second);
+  for (const World* world : {&*first, &*second}) {
+    REQUIRE(world->layers.size() == 1);
+    const SourceSpec& source = world->layers[0].source;
+    CHECK(source.type == "xyz");
+    CHECK(source.url == "https://{s}.host/{z}/{x}/{-y}.webp?key=1");
+    CHECK(source.subdomains == std::vector<std::string>{"a", "b"});
+    CHECK(source.headers.at("Authorization") == "secret");
+    CHECK(source.projection == "geographic");
+    CHECK(source.encoding == "terrarium");
+    CHECK(source.tile_size == 512);
+    CHECK(source.min_level == 1);
+    CHECK(source.max_level == 9);
+    CHECK(source.bounds == std::array<double, 4>{-10.5, -20, 30, 40});
+    CHECK(source.vertical == "egm96");
+  }
 }
 
 TEST_CASE("load_world: a file that is not there is named") {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "raster/box_average.h"
-#include "source/proj/undulation_field.h"
+#include "source/proj/raise_heights.h"
 
 namespace tellurion::source {
 namespace {
@@ -108,28 +108,12 @@ Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Re
   }
 }
 
-void GdalReader::raise_to_ellipsoid(raster::HeightGrid& grid, int level, const PixelWindow& window) {
-  const glm::dvec2 scale = level_scale(layout_->description, level);
-  const Metres spacing = layout_->description.spacing / std::min(scale.x, scale.y);
-  const UndulationsAt at = [&](std::span<const glm::ivec2> samples, std::span<double> metres) {
-    std::vector<glm::dvec2> pixels;
-    pixels.reserve(samples.size());
-    for (const glm::ivec2& sample : samples) pixels.push_back(glm::dvec2(window.x + sample.x + 0.5, window.y + sample.y + 0.5) / scale);
-    std::vector<geo::LatLon> places(pixels.size());
-    mapping_.to_places(pixels, places);
-    datum_->undulations(places, metres);
-  };
-  const std::vector<float> undulations = undulation_field({window.width, window.height}, spacing, at);
-  const auto slope = static_cast<float>(datum_->slope());
-  for (std::size_t i = 0; i < undulations.size(); ++i) grid.metres[i] = grid.metres[i] * slope + undulations[i];
-}
-
 Result<raster::HeightGrid> GdalReader::read_heights(int level, const PixelWindow& window) {
   const QuietErrors quiet;
   const LevelPlan& plan = layout_->levels[static_cast<std::size_t>(level)];
   const auto read = [this](int overview, const PixelWindow& part) { return heights_of_overview(overview, part); };
   Result<raster::HeightGrid> grid = plan.direct ? read(plan.overview, window) : averaged<raster::HeightGrid>(level, window, read);
-  if (grid && datum_) raise_to_ellipsoid(grid.value(), level, window);
+  if (grid && datum_) raise_to_ellipsoid(grid.value(), layout_->description, level, window, mapping_, *datum_);
   return grid;
 }
 

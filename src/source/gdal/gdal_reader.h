@@ -34,7 +34,6 @@ class GdalReader final : public RasterReader {
   Result<raster::HeightGrid> heights_of_overview(int overview, const PixelWindow& window) const;
   Result<raster::Image> colours_of_overview(int overview, const PixelWindow& window) const;
   Result<void> find_ranges();
-  void raise_to_ellipsoid(raster::HeightGrid& grid, int level, const PixelWindow& window);
   template <class Data, class Read>
   Result<Data> averaged(int level, const PixelWindow& window, const Read& read) const;
 

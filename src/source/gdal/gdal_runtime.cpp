@@ -122,6 +122,10 @@ Result<GDALDatasetUniquePtr> open_dataset(const std::string& path) {
   if (VSI_ISDIR(stat.st_mode)) return Error{ErrorCode::unsupported, fmt::format("{}: is a folder, not a raster file", path)};
   const bool known = quiet.last().find("not recognized") == std::string::npos;
   if (known) return Error{ErrorCode::corrupt, fmt::format("{}: GDAL cannot read it: {}", path, quiet.last())};
+  const std::string extension = CPLGetExtension(path.c_str());
+  if (EQUAL(extension.c_str(), "img")) {
+    return Error{ErrorCode::unsupported, fmt::format("{}: a planetary image needs its label beside it, a file of the same name ending in .lbl", path)};
+  }
   return Error{ErrorCode::unsupported, fmt::format("{}: no raster format that GDAL knows; gdalinfo --formats lists them", path)};
 }
 

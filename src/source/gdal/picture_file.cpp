@@ -1,6 +1,9 @@
 #include "source/gdal/picture_file.h"
 
+#include <array>
 #include <cassert>
+#include <cmath>
+#include <cstdint>
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -77,6 +80,90 @@ Result<raster::Image> read_picture(const std::filesystem::path& file) {
       return Error{ErrorCode::corrupt, fmt::format("{}: {}", file.string(), quiet.last())};
   }
   return image;
+}
+
+namespace {
+
+/// Bytes as a file in GDAL's memory, as long as this lives; the bytes outlive it.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const std::string& bytes) : path_(fmt::format("/vsimem/tellurion/{}", static_cast<const void*>(this))) {
+    VSILFILE* file = VSIFileFromMemBuffer(path_.c_str(), reinterpret_cast<GByte*>(const_cast<char*>(bytes.data())), bytes.size(), FALSE);
+    if (file != nullptr) VSIFCloseL(file);
+  }
+  ~MemoryFile() { VSIUnlink(path_.c_str()); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  /// Formats that hold pixels themselves: none that could name other files or hosts.
+  Result<Dataset> open(int largest_side) const {
+    constexpr std::array kDrivers{"JPEG", "PNG", "WEBP", "GTiff", "GIF", static_cast<const char*>(nullptr)};
+    const QuietErrors quiet;
+    Dataset dataset(GDALDataset::Open(path_.c_str(), GDAL_OF_RASTER, kDrivers.data()));
+    if (!dataset) return Error{ErrorCode::corrupt, quiet.last().empty() ? "is no picture" : quiet.last()};
+    if (dataset->GetRasterXSize() > largest_side || dataset->GetRasterYSize() > largest_side)
+      return Error{ErrorCode::exhausted, fmt::format("is a picture of {} x {} pixels", dataset->GetRasterXSize(), dataset->GetRasterYSize())};
+    if (dataset->GetRasterCount() == 0) return Error{ErrorCode::corrupt, "is a picture without bands"};
+    return dataset;
+  }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace
+
+Result<raster::Image> decode_picture(const std::string& bytes, int largest_side) {
+  prepare_gdal();
+  const MemoryFile file(bytes);
+  Result<Dataset> dataset = file.open(largest_side);
+  if (!dataset) return dataset.error();
+  const QuietErrors quiet;
+  GDALDataset& d = *dataset.value();
+  raster::Image image{d.GetRasterXSize(), d.GetRasterYSize(), {}};
+  const std::size_t count = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  image.rgba.assign(count * 4, 255);
+  const auto read = [&](int band, int channel) {
+    return d.GetRasterBand(band)->RasterIO(GF_Read, 0, 0, image.width, image.height, image.rgba.data() + channel, image.width, image.height,
+                                           GDT_Byte, 4, 4 * image.width, nullptr) == CE_None;
+  };
+  const int bands = d.GetRasterCount();
+  bool good = true;
+  if (const GDALColorTable* table = d.GetRasterBand(1)->GetColorTable(); table != nullptr && bands == 1) {
+    good = read(1, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      GDALColorEntry entry{0, 0, 0, 0};
+      table->GetColorEntryAsRGB(image.rgba[4 * i], &entry);
+      image.rgba[4 * i] = static_cast<std::uint8_t>(entry.c1);
+      image.rgba[4 * i + 1] = static_cast<std::uint8_t>(entry.c2);
+      image.rgba[4 * i + 2] = static_cast<std::uint8_t>(entry.c3);
+      image.rgba[4 * i + 3] = static_cast<std::uint8_t>(entry.c4);
+    }
+  } else {
+    for (int channel = 0; channel < 3; ++channel) good = good && read(bands >= 3 ? channel + 1 : 1, channel);
+    if (bands == 2 || bands == 4) good = good && read(bands, 3);
+  }
+  if (!good) return Error{ErrorCode::corrupt, quiet.last()};
+  return image;
+}
+
+Result<raster::HeightGrid> decode_height_band(const std::string& bytes, int largest_side) {
+  prepare_gdal();
+  const MemoryFile file(bytes);
+  Result<Dataset> dataset = file.open(largest_side);
+  if (!dataset) return dataset.error();
+  const QuietErrors quiet;
+  GDALRasterBand& band = *dataset.value()->GetRasterBand(1);
+  raster::HeightGrid grid{band.GetXSize(), band.GetYSize(), {}};
+  grid.metres.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
+  if (band.RasterIO(GF_Read, 0, 0, grid.width, grid.height, grid.metres.data(), grid.width, grid.height, GDT_Float32, 0, 0, nullptr) != CE_None)
+    return Error{ErrorCode::corrupt, quiet.last()};
+  int has = FALSE;
+  const auto no_data = static_cast<float>(band.GetNoDataValue(&has));
+  for (float& metres : grid.metres) {
+    if ((has != FALSE && metres == no_data) || !std::isfinite(metres)) metres = raster::kNoHeight;
+  }
+  return grid;
 }
 
 Result<void> write_float64_tiff(const std::filesystem::path& file, int width, int height,

@@ -1,0 +1,207 @@
+#include "fetch/byte_store.h"
+
+#include <list>
+#include <mutex>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/log.h"
+#include "fetch/disk_cache.h"
+
+namespace tellurion::fetch {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+using System = std::chrono::system_clock;
+
+constexpr std::size_t kEntryBytes = 256;  ///< of an entry beside its file
+
+struct Entry {
+  std::string key;
+  std::variant<File, Error> content;
+  Steady::time_point valid_until;
+  std::size_t bytes = 0;
+};
+
+}  // namespace
+
+struct ByteStore::State : std::enable_shared_from_this<State> {
+  explicit State(const StoreOptions& o) : options(o) {}
+
+  struct Flight {
+    std::weak_ptr<Arrival> arrival;
+    Fetcher::Ticket ticket = 0;
+    std::uint64_t number = 0;
+  };
+
+  const StoreOptions options;
+  std::unique_ptr<DiskCache> disk;  ///< null: none
+
+  std::mutex mutex;  ///< guards what follows
+  std::list<Entry> entries;  ///< the most recently used first
+  std::unordered_map<std::string, std::list<Entry>::iterator> index;
+  std::size_t bytes = 0;
+  std::unordered_map<std::string, Flight> flights;
+  std::uint64_t flight_number = 0;
+
+  std::unique_ptr<Fetcher> fetcher;  ///< last: its thread ends before what it uses; null: offline
+
+  std::optional<Asked> find(const std::string& key);
+  void keep(std::string key, std::variant<File, Error> content, Steady::duration lifetime);
+  void forget(const std::string& key);
+  Asked begin(const Request& request, double gain);
+  std::variant<File, Error> take(const Request& request, Outcome outcome);
+  void arrived(const Request& request, std::uint64_t number, Outcome outcome);
+  void abandoned(const std::string& key, std::uint64_t number);
+};
+
+void ByteStore::State::forget(const std::string& key) {
+  const auto found = index.find(key);
+  if (found == index.end()) return;
+  bytes -= found->second->bytes;
+  entries.erase(found->second);
+  index.erase(found);
+}
+
+void ByteStore::State::keep(std::string key, std::variant<File, Error> content, Steady::duration lifetime) {
+  forget(key);
+  const File* file = std::get_if<File>(&content);
+  const std::size_t size = kEntryBytes + key.size() + (file && file->bytes ? file->bytes->size() : 0);
+  entries.push_front(Entry{key, std::move(content), Steady::now() + lifetime, size});
+  index.emplace(std::move(key), entries.begin());
+  bytes += size;
+  while (entries.size() > 1 && bytes > options.memory_bytes) forget(std::string(entries.back().key));
+}
+
+/// What memory has, or the flight that brings it.
+std::optional<Asked> ByteStore::State::find(const std::string& key) {
+  if (const auto found = index.find(key); found != index.end()) {
+    if (Steady::now() < found->second->valid_until) {
+      entries.splice(entries.begin(), entries, found->second);
+      return std::visit([](const auto& content) { return Asked(content); }, found->second->content);
+    }
+    forget(key);
+  }
+  if (const auto flying = flights.find(key); flying != flights.end()) {
+    if (auto arrival = flying->second.arrival.lock()) return Asked(std::move(arrival));
+  }
+  return std::nullopt;
+}
+
+/// The last holder of an arrival let it go.
+void ByteStore::State::abandoned(const std::string& key, std::uint64_t number) {
+  std::lock_guard lock(mutex);
+  const auto flying = flights.find(key);
+  if (flying == flights.end() || flying->second.number != number) return;
+  fetcher->cancel(flying->second.ticket);
+  flights.erase(flying);
+}
+
+/// Starts a transfer; called with the mutex held.
+Asked ByteStore::State::begin(const Request& request, double gain) {
+  const std::uint64_t number = ++flight_number;
+  std::shared_ptr<Arrival> arrival(new Arrival, [weak = weak_from_this(), key = request.key, number](Arrival* gone) {
+    if (const auto state = weak.lock()) state->abandoned(key, number);
+    delete gone;
+  });
+  const auto ticket = fetcher->start(request, gain, [weak = weak_from_this(), request, number](Outcome outcome) {
+    if (const auto state = weak.lock()) state->arrived(request, number, std::move(outcome));
+  });
+  flights[request.key] = {arrival, ticket, number};
+  return arrival;
+}
+
+/// What a transfer's outcome says of the file, kept on disk where that makes sense.
+std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome outcome) {
+  if (!outcome) {
+    if (outcome.error().code != ErrorCode::not_found) return outcome.error();
+    if (disk) disk->put(request.key, {{}, true, {}, {}, System::now() + options.negative_lifetime});
+    return File{};
+  }
+  const System::time_point expires = System::now() + outcome->max_age.value_or(options.default_lifetime);
+  if (outcome->not_modified) {
+    std::optional<DiskEntry> old = disk ? disk->find(request.key) : std::nullopt;
+    if (!old || old->missing) return Error{ErrorCode::unavailable, fmt::format("{}: was dropped from the cache just now", public_part(request.url))};
+    disk->renew(request.key, expires);
+    return File{std::make_shared<const std::string>(std::move(old->body)), old->content_type};
+  }
+  DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires};
+  if (disk) disk->put(request.key, entry);
+  return File{std::make_shared<const std::string>(std::move(entry.body)), std::move(entry.content_type)};
+}
+
+void ByteStore::State::arrived(const Request& request, std::uint64_t number, Outcome outcome) {
+  const bool cancelled = !outcome && outcome.error().code == ErrorCode::cancelled;
+  std::shared_ptr<Arrival> arrival;  // its deleter takes the mutex: it has to outlive the lock
+  std::variant<File, Error> content = Error{};
+  if (!cancelled) content = take(request, std::move(outcome));
+  {
+    std::lock_guard lock(mutex);
+    const auto flying = flights.find(request.key);
+    if (flying != flights.end() && flying->second.number == number) {
+      arrival = flying->second.arrival.lock();
+      flights.erase(flying);
+    }
+    if (!cancelled) {
+      const bool failed = std::holds_alternative<Error>(content);
+      const bool missing = !failed && !std::get<File>(content).bytes;
+      const Steady::duration lifetime = failed ? Steady::duration(options.pause_after_failure)
+                                               : missing ? Steady::duration(options.negative_lifetime) : Steady::duration(options.default_lifetime);
+      keep(request.key, std::move(content), lifetime);
+    }
+  }
+  if (arrival) arrival->end();
+}
+
+ByteStore::ByteStore(const StoreOptions& options) : state_(std::make_shared<State>(options)) {
+  if (!options.disk_file.empty()) {
+    auto disk = DiskCache::open(options.disk_file, options.disk_bytes);
+    if (disk) state_->disk = std::move(*disk);
+    else log::warning(disk.error().message);
+  }
+  if (!options.offline) state_->fetcher = std::make_unique<Fetcher>(options.fetch);
+}
+
+ByteStore::~ByteStore() { state_->fetcher.reset(); }
+
+Asked ByteStore::ask(const Request& request, double gain) {
+  State& s = *state_;
+  {
+    std::lock_guard lock(s.mutex);
+    if (auto found = s.find(request.key)) return std::move(*found);
+  }
+  Request wanted = request;
+  if (s.disk) {
+    if (std::optional<DiskEntry> entry = s.disk->find(request.key)) {
+      const bool fresh = s.options.offline || System::now() < entry->expires;
+      if (fresh) {
+        File file;
+        if (!entry->missing) file = {std::make_shared<const std::string>(std::move(entry->body)), entry->content_type};
+        std::lock_guard lock(s.mutex);
+        s.keep(request.key, file, entry->missing ? Steady::duration(s.options.negative_lifetime) : Steady::duration(s.options.default_lifetime));
+        return file;
+      }
+      if (!entry->missing) wanted.etag = entry->etag;
+    }
+  }
+  if (!s.fetcher) return Error{ErrorCode::unavailable, fmt::format("{}: is not in the disk cache, and --offline fetches nothing", public_part(request.url))};
+  std::lock_guard lock(s.mutex);
+  if (auto found = s.find(request.key)) return std::move(*found);  // someone else was faster
+  return s.begin(wanted, gain);
+}
+
+void ByteStore::reject(const std::string& key, const std::string& why) {
+  State& s = *state_;
+  if (s.disk) s.disk->remove(key);
+  std::lock_guard lock(s.mutex);
+  s.keep(key, Error{ErrorCode::unavailable, why}, s.options.pause_after_failure);
+}
+
+FetchStats ByteStore::stats() const { return state_->fetcher ? state_->fetcher->stats() : FetchStats{}; }
+std::size_t ByteStore::disk_bytes() const { return state_->disk ? state_->disk->bytes() : 0; }
+bool ByteStore::offline() const { return state_->options.offline; }
+
+}  // namespace tellurion::fetch

@@ -1,0 +1,285 @@
+#include "fetch/disk_cache.h"
+
+#include <algorithm>
+#include <mutex>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include "base/hash.h"
+#include "base/log.h"
+
+namespace tellurion::fetch {
+namespace {
+
+constexpr int kVersion = 1;             ///< of the tables
+constexpr int kBusyWait_ms = 2000;      ///< for another process
+constexpr double kRoomAfterwards = 0.9; ///< share of the budget that is left filled when room is made
+
+struct DatabaseDeleter {
+  void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
+};
+using Database = std::unique_ptr<sqlite3, DatabaseDeleter>;
+
+struct StatementDeleter {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+
+/// A prepared statement, used again and again.
+class Statement {
+ public:
+  Statement() = default;
+  Statement(sqlite3* database, const char* text) {
+    sqlite3_stmt* made = nullptr;
+    sqlite3_prepare_v3(database, text, -1, SQLITE_PREPARE_PERSISTENT, &made, nullptr);
+    statement_.reset(made);
+  }
+  explicit operator bool() const { return statement_ != nullptr; }
+
+  /// Binds in order and takes the first step.
+  template <class... Values>
+  int run(const Values&... values) {
+    sqlite3_reset(statement_.get());
+    sqlite3_clear_bindings(statement_.get());
+    int place = 0;
+    (bind(++place, values), ...);
+    return sqlite3_step(statement_.get());
+  }
+  int next() { return sqlite3_step(statement_.get()); }
+  void finish() { sqlite3_reset(statement_.get()); }
+
+  std::int64_t number(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+  std::string text(int column) const {
+    const void* data = sqlite3_column_blob(statement_.get(), column);
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+    return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
+  }
+
+ private:
+  void bind(int place, std::int64_t value) { sqlite3_bind_int64(statement_.get(), place, value); }
+  void bind(int place, std::string_view value) {
+    sqlite3_bind_text64(statement_.get(), place, value.data(), value.size(), SQLITE_STATIC, SQLITE_UTF8);
+  }
+  struct Blob {
+    std::string_view bytes;
+  };
+  void bind(int place, const Blob& value) {
+    sqlite3_bind_blob64(statement_.get(), place, value.bytes.data(), value.bytes.size(), SQLITE_STATIC);
+  }
+
+  std::unique_ptr<sqlite3_stmt, StatementDeleter> statement_;
+
+ public:
+  static Blob blob(std::string_view bytes) { return {bytes}; }
+};
+
+std::int64_t seconds_of(std::chrono::system_clock::time_point time) {
+  return std::chrono::duration_cast<std::chrono::seconds>(time.time_since_epoch()).count();
+}
+
+std::int64_t now_ms() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+std::int64_t checksum_of(std::string_view key, std::string_view body) {
+  return static_cast<std::int64_t>(fnv1a(body) ^ (fnv1a(key) * 3));
+}
+
+}  // namespace
+
+struct DiskCache::State {
+  std::filesystem::path file;
+  std::size_t budget_bytes = 0;
+
+  mutable std::mutex mutex;  ///< guards what follows
+  Database database;
+  Statement find, put, drop, use, renew, sum, oldest;
+  std::int64_t bytes = 0;
+  bool full = false;         ///< the disk, told once
+
+  bool execute(const char* text) { return sqlite3_exec(database.get(), text, nullptr, nullptr, nullptr) == SQLITE_OK; }
+  bool open();
+  void make_room();
+  void recount();
+};
+
+bool DiskCache::State::open() {
+  sqlite3* opened = nullptr;
+  const int status = sqlite3_open_v2(file.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
+  database.reset(opened);
+  if (status != SQLITE_OK) return false;
+  sqlite3_busy_timeout(database.get(), kBusyWait_ms);
+  sqlite3_extended_result_codes(database.get(), 1);
+  const std::string make = fmt::format(
+      "CREATE TABLE IF NOT EXISTS files (key TEXT PRIMARY KEY, body BLOB NOT NULL, missing INTEGER NOT NULL, etag TEXT NOT NULL,"
+      " type TEXT NOT NULL, expires INTEGER NOT NULL, used INTEGER NOT NULL, bytes INTEGER NOT NULL, checksum INTEGER NOT NULL);"
+      "CREATE INDEX IF NOT EXISTS files_used ON files (used, bytes);"
+      "PRAGMA user_version = {};", kVersion);
+  if (!execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA auto_vacuum = INCREMENTAL;")) return false;
+  Statement version(database.get(), "PRAGMA user_version");
+  if (!version || version.run() != SQLITE_ROW) return false;
+  const std::int64_t found = version.number(0);
+  version.finish();
+  if (found != 0 && found != kVersion) return false;
+  if (found == 0 && !execute(make.c_str())) return false;
+  find = Statement(database.get(), "SELECT body, missing, etag, type, expires, checksum, used FROM files WHERE key = ?");
+  put = Statement(database.get(), "INSERT OR REPLACE INTO files (key, body, missing, etag, type, expires, used, bytes, checksum)"
+                                  " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  drop = Statement(database.get(), "DELETE FROM files WHERE key = ?");
+  use = Statement(database.get(), "UPDATE files SET used = ? WHERE key = ?");
+  renew = Statement(database.get(), "UPDATE files SET expires = ? WHERE key = ?");
+  sum = Statement(database.get(), "SELECT COUNT(*), COALESCE(SUM(bytes), 0), COALESCE(SUM(missing), 0) FROM files");
+  oldest = Statement(database.get(), "SELECT key, bytes FROM files ORDER BY used LIMIT 256");
+  if (!find || !put || !drop || !use || !renew || !sum || !oldest) return false;
+  recount();
+  return true;
+}
+
+void DiskCache::State::recount() {
+  if (sum.run() == SQLITE_ROW) bytes = sum.number(1);
+  sum.finish();
+}
+
+/// Drops the least recently used ones until there is some room again. Other processes write too: counts anew first.
+void DiskCache::State::make_room() {
+  recount();
+  const auto enough = static_cast<std::int64_t>(kRoomAfterwards * static_cast<double>(budget_bytes));
+  if (bytes <= static_cast<std::int64_t>(budget_bytes)) return;
+  execute("BEGIN IMMEDIATE");
+  while (bytes > enough) {
+    std::vector<std::pair<std::string, std::int64_t>> old;
+    for (int step = oldest.run(); step == SQLITE_ROW; step = oldest.next()) old.emplace_back(oldest.text(0), oldest.number(1));
+    oldest.finish();
+    if (old.empty()) break;
+    for (const auto& [key, size] : old) {
+      if (bytes <= enough) break;
+      drop.run(std::string_view(key));
+      drop.finish();
+      bytes -= size;
+    }
+  }
+  execute("COMMIT");
+  execute("PRAGMA incremental_vacuum");
+}
+
+DiskCache::DiskCache(std::unique_ptr<State> state) : state_(std::move(state)) {}
+DiskCache::~DiskCache() = default;
+
+Result<std::unique_ptr<DiskCache>> DiskCache::open(const std::filesystem::path& file, std::size_t budget_bytes) {
+  auto state = std::make_unique<State>();
+  state->file = file;
+  state->budget_bytes = budget_bytes;
+  std::error_code failure;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
+  const bool existed = std::filesystem::exists(file, failure);
+  if (!state->open() && existed) {
+    // No database, or one of another version.
+    state = std::make_unique<State>();
+    state->file = file;
+    state->budget_bytes = budget_bytes;
+    std::filesystem::path aside = file;
+    aside += ".damaged";
+    std::filesystem::rename(file, aside, failure);
+    for (const char* more : {"-wal", "-shm"}) std::filesystem::remove(file.string() + more, failure);
+    log::warning(fmt::format("{}: no readable cache; it was set aside as {} and begun anew", file.string(), aside.string()));
+    if (!state->open()) state->database.reset();
+  }
+  if (!state->oldest) return Error{ErrorCode::unavailable, fmt::format("{}: the disk cache cannot be opened; is the folder there and writable?", file.string())};
+  return std::unique_ptr<DiskCache>(new DiskCache(std::move(state)));
+}
+
+std::optional<DiskEntry> DiskCache::find(std::string_view key) {
+  constexpr std::int64_t kUseEvery_ms = 60'000;  // a read that writes each time would be slow
+  State& s = *state_;
+  std::lock_guard lock(s.mutex);
+  if (s.find.run(key) != SQLITE_ROW) {
+    s.find.finish();
+    return std::nullopt;
+  }
+  DiskEntry entry{s.find.text(0), s.find.number(1) != 0, s.find.text(2), s.find.text(3),
+                  std::chrono::system_clock::time_point(std::chrono::seconds(s.find.number(4)))};
+  const std::int64_t checksum = s.find.number(5), used = s.find.number(6);
+  s.find.finish();
+  if (checksum != checksum_of(key, entry.body)) {
+    s.drop.run(key);
+    s.drop.finish();
+    return std::nullopt;
+  }
+  if (const std::int64_t now = now_ms(); now - used > kUseEvery_ms) {
+    s.use.run(now, key);
+    s.use.finish();
+  }
+  return entry;
+}
+
+void DiskCache::put(std::string_view key, const DiskEntry& entry) {
+  State& s = *state_;
+  if (entry.body.size() > s.budget_bytes / 4) return;
+  std::lock_guard lock(s.mutex);
+  const auto size = static_cast<std::int64_t>(entry.body.size() + key.size());
+  const int status = s.put.run(key, Statement::blob(entry.body), std::int64_t{entry.missing}, std::string_view(entry.etag),
+                               std::string_view(entry.content_type), seconds_of(entry.expires), now_ms(), size, checksum_of(key, entry.body));
+  s.put.finish();
+  if (status != SQLITE_DONE) {
+    if (!std::exchange(s.full, true)) log::warning(fmt::format("{}: {}; what is fetched is not kept", s.file.string(), sqlite3_errstr(status)));
+    return;
+  }
+  s.bytes += size;
+  if (s.bytes > static_cast<std::int64_t>(s.budget_bytes)) s.make_room();
+}
+
+void DiskCache::remove(std::string_view key) {
+  std::lock_guard lock(state_->mutex);
+  state_->drop.run(key);
+  state_->drop.finish();
+}
+
+void DiskCache::renew(std::string_view key, std::chrono::system_clock::time_point expires) {
+  std::lock_guard lock(state_->mutex);
+  state_->renew.run(seconds_of(expires), key);
+  state_->renew.finish();
+}
+
+DiskCache::Contents DiskCache::contents() const {
+  State& s = *state_;
+  std::lock_guard lock(s.mutex);
+  Contents contents;
+  if (s.sum.run() == SQLITE_ROW) contents = {s.sum.number(0), s.sum.number(1), s.sum.number(2)};
+  s.sum.finish();
+  return contents;
+}
+
+void DiskCache::clear() {
+  State& s = *state_;
+  std::lock_guard lock(s.mutex);
+  s.execute("DELETE FROM files; PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE)");
+  s.recount();
+}
+
+std::int64_t DiskCache::verify() {
+  State& s = *state_;
+  std::lock_guard lock(s.mutex);
+  std::vector<std::string> wrong;
+  Statement all(s.database.get(), "SELECT key, body, checksum FROM files");
+  for (int step = all.run(); step == SQLITE_ROW; step = all.next()) {
+    const std::string key = all.text(0);
+    if (all.number(2) != checksum_of(key, all.text(1))) wrong.push_back(key);
+  }
+  all.finish();
+  for (const std::string& key : wrong) {
+    s.drop.run(std::string_view(key));
+    s.drop.finish();
+  }
+  s.recount();
+  return static_cast<std::int64_t>(wrong.size());
+}
+
+std::size_t DiskCache::bytes() const {
+  std::lock_guard lock(state_->mutex);
+  return static_cast<std::size_t>(state_->bytes);
+}
+
+}  // namespace tellurion::fetch

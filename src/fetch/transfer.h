@@ -1,0 +1,44 @@
+// What is asked of a server, and what it said.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace tellurion::fetch {
+
+/// A file on a server.
+struct Request {
+  std::string url;                   ///< http: or https:; may hold credentials
+  std::vector<std::string> headers;  ///< "Name: value"; may hold credentials
+  std::string key{};                   ///< names the bytes in caches; holds no credentials
+  std::string etag;                  ///< of bytes that are there already: only others are sent
+};
+
+/// The end of a transfer that the server answered.
+struct Reply {
+  std::string body;
+  std::string content_type;
+  std::string etag;
+  std::optional<std::chrono::seconds> max_age;  ///< for how long the server says that it holds
+  bool not_modified = false;                    ///< the bytes are still those of Request::etag; no body
+};
+
+/// Errors: not_found (204, 404, 410: there is no such file), unsupported (401, 403 and other refusals: asking again cannot
+/// help), unavailable (no connection, time-out, 429, 5xx: after all retries), exhausted (too large), cancelled.
+/// Messages name the URL without its query, and what to do.
+using Outcome = Result<Reply>;
+using Done = std::function<void(Outcome)>;
+
+/// `url` as messages show it: without user, password and query, which may be credentials.
+std::string public_part(const std::string& url);
+
+/// `url` without user, password and those parts of its query that look like credentials: fit for a key.
+std::string without_credentials(const std::string& url);
+
+}  // namespace tellurion::fetch

@@ -1,0 +1,42 @@
+// Addresses of tiles: a template with places for column, row and zoom.
+// Thread-safe: immutable values.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace tellurion::source {
+
+/// A tile of a pyramid: level 0 is the coarsest, rows count from the north.
+struct TileAddress {
+  int zoom = 0;
+  std::int64_t column = 0;
+  std::int64_t row = 0;
+
+  friend bool operator==(const TileAddress&, const TileAddress&) = default;
+};
+
+class TileTemplate {
+ public:
+  /// `{z}`, `{x}`, `{y}` (rows from the north), `{-y}` (from the south, as TMS has them), `{q}` (Bing's quadkey) and `{s}`
+  /// (one of `subdomains`, by the tile). Errors: invalid_argument, naming what is unknown or missing.
+  static Result<TileTemplate> parse(const std::string& text, std::vector<std::string> subdomains);
+
+  /// `rows`: of the tile's zoom.
+  std::string url(const TileAddress& tile, std::int64_t rows) const;
+
+ private:
+  enum class Field { zoom, column, row, row_from_south, quadkey, subdomain };
+  struct Piece {
+    std::string text;  ///< before the field
+    Field field;
+  };
+  std::vector<Piece> pieces_;
+  std::string end_;
+  std::vector<std::string> subdomains_;
+};
+
+}  // namespace tellurion::source

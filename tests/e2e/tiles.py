@@ -1,0 +1,206 @@
+"""Tiles from a server on loopback: asked for once, kept for the next time, and faults survived."""
+# label: slow
+# timeout: 900
+import collections
+import http.server
+import json
+import random
+import threading
+import time
+import unittest
+
+import numpy as np
+from osgeo import gdal
+
+from _common import ETOPO5, SHARED, Case, read_geo, shared
+
+NIGHT = "earth/tiles/blackmarble_tms_mercator"
+TERRARIUM = "earth/tiles/terrarium_etopo5"
+RAINIER_TILES = "earth/tiles/terrain_rgb_webp_rainier"
+
+
+class TileServer:
+    """Serves the shared folder of tiles, counts what is asked for, and answers wrongly when told to."""
+
+    def __init__(self, fault=lambda path, times: None):
+        self.asked = collections.Counter()
+        self.headers = {}
+        lock = threading.Lock()
+        server = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            protocol_version = "HTTP/1.1"
+
+            def do_GET(self):
+                path = self.path.split("?")[0]
+                with lock:
+                    server.asked[path] += 1
+                    server.headers[path] = dict(self.headers)
+                    times = server.asked[path]
+                kind = fault(path, times)
+                if kind == "reset":
+                    self.close_connection = True
+                    return
+                if kind == "stall":
+                    time.sleep(3)
+                file = SHARED / path.lstrip("/")
+                body = file.read_bytes() if file.is_file() else b""
+                status, claimed, content = (200, len(body), "image/png") if body else (404, 0, "text/plain")
+                extra = []
+                if isinstance(kind, int):
+                    status, body, claimed = kind, b"", 0
+                    extra = [("Retry-After", "1")] if kind == 429 else []
+                elif kind == "truncated":
+                    body, self.close_connection = body[:len(body) // 2], True
+                elif kind == "page":
+                    body, content = b"<html>no tile for you</html>", "text/html"
+                    claimed = len(body)
+                elif kind == "corrupt":
+                    body = body[:40] + bytes(255 - b for b in body[40:])
+                elif kind == "large":
+                    body = (SHARED / "moon/moon_4k.jpg").read_bytes()
+                    claimed = len(body)
+                self.send_response(status)
+                self.send_header("Content-Type", content)
+                self.send_header("Content-Length", str(claimed))
+                for header in extra:
+                    self.send_header(*header)
+                self.end_headers()
+                self.wfile.write(body)
+
+            def log_message(self, *_):
+                pass
+
+        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.http.daemon_threads = True
+        threading.Thread(target=self.http.serve_forever, daemon=True).start()
+
+    def url(self, path):
+        return f"http://127.0.0.1:{self.http.server_port}/{path}"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.http.shutdown()
+        self.http.server_close()
+
+
+class Tiles(Case):
+    def world_of_tiles(self, name, *layers):
+        """A world file of (group, source as TOML) pairs."""
+        path = self.folder / f"{name}.toml"
+        path.write_text("".join(f'[[layer]]\ngroup = "{group}"\nsource = {{ {source} }}\n' for group, source in layers))
+        return path
+
+    def night(self, server, more="max_level = 4"):
+        return self.world_of_tiles("night", ("height", f'path = "{shared(ETOPO5)}", vertical = "ellipsoid"'),
+                                   ("color", f'type = "xyz", url = "{server.url(NIGHT)}/{{z}}/{{x}}/{{-y}}.png", {more}'))
+
+    view = (30, 30, 15000000, 0, -90)
+
+    def test_each_tile_is_fetched_once_and_the_next_run_fetches_none(self):
+        with TileServer() as server:
+            first = self.render(self.night(server), self.view, name="first")
+            self.assertGreater(len(server.asked), 20)
+            self.assertEqual(set(server.asked.values()), {1}, "no tile is asked for twice")
+            asked = sum(server.asked.values())
+            second = self.render(self.night(server), self.view, name="second")
+            self.assertEqual(sum(server.asked.values()), asked, "a warm disk cache needs no request")
+            self.assertEqual(first.read_bytes(), second.read_bytes())
+            world = self.night(server)
+        offline = self.render(world, self.view, "--offline", name="offline")
+        self.assertEqual(first.read_bytes(), offline.read_bytes())
+
+    def test_a_url_is_a_world_over_the_default_one(self):
+        with TileServer() as server:
+            url = server.url(NIGHT) + "/{z}/{x}/{-y}.png?key=sesame"
+            stats = self.folder / "stats.json"
+            self.render(url, (89.9, 0, 3000000, 0, -90), "--stats", stats, name="pole")
+        names = [source["name"] for source in json.loads(stats.read_text())["sources"]]
+        self.assertTrue(any(NIGHT in name for name in names))
+        self.assertNotIn("sesame", stats.read_text())
+        for file in (self.folder / "cache").rglob("*"):
+            if file.is_file():
+                self.assertNotIn(b"sesame", file.read_bytes(), f"{file} holds the key")
+
+    def test_the_pole_of_a_mercator_layer_shows_the_layer_below(self):
+        plain = self.render("", (89.9, 0, 500000, 0, -90), "--no-atmosphere", name="plain")
+        with TileServer() as server:
+            over = self.render(server.url(NIGHT) + "/{z}/{x}/{-y}.png", (89.9, 0, 500000, 0, -90), "--no-atmosphere", name="over")
+        # Nothing in view lies within 85 degrees of the equator. Slots may be finer than without the layer: means of 20x20 pixels.
+        def means(file):
+            pixels = gdal.Open(str(file)).ReadAsArray()[:3].astype(float)
+            return pixels.reshape(3, 36, 20, 64, 20).mean(axis=(2, 4))
+        self.assertLess(np.mean(np.abs(means(plain) - means(over))), 1)
+        self.assertGreater(np.ptp(means(plain)), 40, "there is something to see")
+
+    def test_heights_agree_with_the_numbers_in_the_tiles(self):
+        with TileServer() as server:
+            world = self.world_of_tiles("heights", ("height", f'type = "xyz", url = "{server.url(TERRARIUM)}/{{z}}/{{x}}/{{y}}.png", '
+                                                    'encoding = "terrarium", max_level = 3, vertical = "ellipsoid"'))
+            side = 256 << 3
+            places, wanted = [], []
+            random.seed(3)
+            for _ in range(200):
+                column, row = random.randrange(side), random.randrange(side)
+                lon = (column + 0.5) / side * 360 - 180
+                lat = np.degrees(np.arctan(np.sinh(np.pi * (1 - 2 * (row + 0.5) / side))))
+                tile = gdal.Open(str(shared(f"{TERRARIUM}/3/{column // 256}/{row // 256}.png"))).ReadAsArray().astype(float)
+                r, g, b = tile[:3, row % 256, column % 256]
+                places.append(f"{lat:.12f} {lon:.12f}")
+                wanted.append(r * 256 + g + b / 256 - 32768)
+            printed = self.tellurion("height", world, text="\n".join(places) + "\n").stdout
+        found = [float(line.split()[2]) for line in printed.strip().split("\n")]
+        self.assertLess(np.max(np.abs(np.subtract(found, wanted))), 2e-3)
+
+    def test_a_mountain_out_of_regional_tiles_over_global_ones(self):
+        with TileServer() as server:
+            world = self.world_of_tiles(
+                "rainier",
+                ("height", f'type = "xyz", url = "{server.url(TERRARIUM)}/{{z}}/{{x}}/{{y}}.png", encoding = "terrarium", max_level = 3, vertical = "ellipsoid"'),
+                ("height", f'type = "xyz", url = "{server.url(RAINIER_TILES)}/{{z}}/{{x}}/{{y}}.webp", encoding = "terrain-rgb", '
+                           'min_level = 9, max_level = 11, bounds = [-122, 46, -121, 47], vertical = "ellipsoid"'))
+            geo = self.folder / "where.tif"
+            self.render(world, (46.85, -121.76, 9000, 0, -90), "--size", "320x180", "--geo", geo, name="rainier")
+            missing = [path for path in server.asked if RAINIER_TILES in path and not (SHARED / path.lstrip("/")).exists()]
+            printed = self.tellurion("height", world, text="46.8529 -121.7604\n").stdout
+        self.assertLess(len(missing), 60, "nothing is asked for beyond the bounds")
+        self.assertGreater(np.nanmax(read_geo(geo)[2]), 4300, "the summit")
+        self.assertAlmostEqual(float(printed.split()[2]), 4370, delta=15)
+
+    def test_faults_are_survived_and_nothing_wrong_is_kept(self):
+        kinds = ["reset", 500, 429, "truncated", "page", "corrupt", "large", "stall"]
+
+        def fault(path, times):
+            chosen = random.Random(path).random()
+            return kinds[int(chosen * 20 * len(kinds)) % len(kinds)] if chosen < 0.4 and times == 1 else None
+
+        with TileServer() as server:
+            good = self.render(self.night(server), self.view, "--disk-cache", self.folder / "good", name="good")
+        with TileServer(fault) as server:
+            world = self.night(server)
+            done = self.tellurion("render", world, "--out", self.folder / "faulty.png", "--camera", ",".join(map(str, self.view)),
+                                  "--disk-cache", self.folder / "faulty", "--timeout", 120, timeout=200)
+            self.assertGreater(sum(1 for count in server.asked.values() if count > 1), 5, "there were faults")
+        self.assertEqual(good.read_bytes(), (self.folder / "faulty.png").read_bytes())
+        self.assertLessEqual(len(done.stderr.splitlines()), 8, done.stderr)
+        kept = self.render(world, self.view, "--disk-cache", self.folder / "faulty", "--offline", name="kept")
+        self.assertEqual(good.read_bytes(), kept.read_bytes())
+
+    def test_what_is_wrong_is_said(self):
+        with TileServer(lambda path, times: 403) as server:
+            done = self.tellurion("render", self.night(server), "--out", self.folder / "x.png", "--timeout", 20, status=3)
+            self.assertIn("check the key", done.stderr)
+        done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}.png", "--out", self.folder / "x.png", status=1)
+        self.assertIn("{y}", done.stderr)
+        done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", self.folder / "x.png", "--timeout", 8, status=3)
+        self.assertIn("is the server there", done.stderr)
+        with TileServer() as server:
+            done = self.tellurion("render", self.night(server, "max_level = 4, tile_size = 512"), "--out", self.folder / "x.png",
+                                  "--timeout", 8, status=3)
+            self.assertIn("tile_size", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
