@@ -55,6 +55,10 @@ CLI::Option* add_text(CLI::App& app, const std::string& name, std::function<void
 
 }  // namespace
 
+void add_disk_cache(CLI::App& app, Options& options) {
+  add_text(app, "--disk-cache", [&options](const std::string& t) { set_disk_cache(t, options); }, "folder of what is kept, and its bound in MB", "DIR[,MB]");
+}
+
 CLI::Validator in_range(double least, double most) {
   const auto check = [least, most](const std::string& text) {
     double value = 0;
@@ -127,7 +131,7 @@ void add_resource_options(CLI::App& app, Options& options) {
   };
   megabytes("--gpu-cache", options.gpu_cache_bytes, "graphics memory (512)");
   megabytes("--memory-cache", options.memory_cache_bytes, "decoded data in memory (512)");
-  add_text(app, "--disk-cache", [&options](const std::string& t) { set_disk_cache(t, options); }, "folder of what is kept, and its bound in MB", "DIR[,MB]");
+  add_disk_cache(app, options);
   app.add_flag("--offline", options.offline, "use no network");
 }
 

@@ -41,6 +41,9 @@ struct Options {
   std::filesystem::path geo_file;
 };
 
+/// The folder of what is kept, and its bound.
+void add_disk_cache(CLI::App& app, Options& options);
+
 /// Accepts numbers from `least` to `most`; not a number is none.
 CLI::Validator in_range(double least, double most);
 

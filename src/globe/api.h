@@ -7,6 +7,7 @@
 #include "globe/frame_stats.h"
 #include "globe/globe.h"
 #include "globe/globe_view.h"
+#include "globe/kept_files.h"
 #include "globe/picture_file.h"
 #include "globe/world.h"
 #include "source/raster_source.h"

@@ -12,6 +12,7 @@
 
 #include "cache/block_cache.h"
 #include "globe/height_tables.h"
+#include "globe/kept_files.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
 #include "fetch/byte_store.h"
@@ -105,7 +106,7 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
   if (spec.source.type == "xyz") {
     if (!store) {
       fetch::StoreOptions how;
-      if (!options.cache_folder.empty()) how.disk_file = options.cache_folder / "files.sqlite";
+      if (!options.cache_folder.empty()) how.disk_file = kept_database(options.cache_folder);
       how.disk_bytes = options.disk_cache_bytes;
       how.offline = options.offline;
       store = std::make_shared<fetch::ByteStore>(how);

@@ -5,6 +5,7 @@ import collections
 import http.server
 import json
 import random
+import sqlite3
 import threading
 import time
 import unittest
@@ -111,6 +112,24 @@ class Tiles(Case):
             world = self.night(server)
         offline = self.render(world, self.view, "--offline", name="offline")
         self.assertEqual(first.read_bytes(), offline.read_bytes())
+
+    def test_the_cache_tells_what_it_holds_and_is_emptied(self):
+        kept = self.folder / "own"
+        with TileServer() as server:
+            self.render(self.night(server), self.view, "--disk-cache", kept, name="own")
+            asked = len(server.asked)
+        self.assertIn(f"{asked} files", self.tellurion("cache", "info", "--disk-cache", kept).stdout)
+        self.assertIn("every file", self.tellurion("cache", "verify", "--disk-cache", kept).stdout)
+        # A byte turns over in a tile.
+        database = sqlite3.connect(kept / "files.sqlite")
+        with database:
+            key, body = database.execute("SELECT key, body FROM files LIMIT 1").fetchone()
+            database.execute("UPDATE files SET body = ? WHERE key = ?", (body[:50] + bytes([body[50] ^ 1]) + body[51:], key))
+        database.close()
+        self.assertIn("1 damaged", self.tellurion("cache", "verify", "--disk-cache", kept).stdout)
+        self.tellurion("cache", "clear", "--disk-cache", kept)
+        self.assertIn("from servers  0 files", self.tellurion("cache", "info", "--disk-cache", kept).stdout)
+        self.assertIn("from servers  0 files", self.tellurion("cache", "info", "--disk-cache", self.folder / "none").stdout)
 
     def test_a_url_is_a_world_over_the_default_one(self):
         with TileServer() as server:
