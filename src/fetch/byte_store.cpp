@@ -96,7 +96,7 @@ void ByteStore::State::abandoned(const std::string& key, std::uint64_t number) {
   std::lock_guard lock(mutex);
   const auto flying = flights.find(key);
   if (flying == flights.end() || flying->second.number != number) return;
-  fetcher->cancel(flying->second.ticket);
+  if (fetcher) fetcher->cancel(flying->second.ticket);  // none: the store is going
   flights.erase(flying);
 }
 
@@ -202,6 +202,5 @@ void ByteStore::reject(const std::string& key, const std::string& why) {
 
 FetchStats ByteStore::stats() const { return state_->fetcher ? state_->fetcher->stats() : FetchStats{}; }
 std::size_t ByteStore::disk_bytes() const { return state_->disk ? state_->disk->bytes() : 0; }
-bool ByteStore::offline() const { return state_->options.offline; }
 
 }  // namespace tellurion::fetch

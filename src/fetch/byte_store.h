@@ -53,7 +53,6 @@ class ByteStore {
 
   FetchStats stats() const;
   std::size_t disk_bytes() const;
-  bool offline() const;
 
  private:
   struct State;

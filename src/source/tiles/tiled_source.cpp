@@ -13,7 +13,6 @@
 #include <fmt/format.h>
 
 #include "base/frozen.h"
-#include "base/hash.h"
 #include "raster/box_average.h"
 #include "source/gdal/picture_file.h"
 #include "source/grid_coverage.h"
