@@ -53,6 +53,7 @@ struct RasterDescription {
   bool vertical_declared = false;  ///< false: heights were taken as above the ellipsoid, which can be 100 m off
   geo::GeodeticBounds bounds;      ///< smallest ones that hold the raster
   Metres spacing;                  ///< on the ground between samples, larger axis, in the raster's middle
+  std::string attribution;         ///< whom to credit; may be empty
   std::vector<std::string> hints;  ///< sentences that a user should see
 };
 

@@ -7,17 +7,9 @@
 #include <vector>
 
 #include "base/result.h"
+#include "source/tiles/tile_address.h"
 
 namespace tellurion::source {
-
-/// A tile of a pyramid: level 0 is the coarsest, rows count from the north.
-struct TileAddress {
-  int zoom = 0;
-  std::int64_t column = 0;
-  std::int64_t row = 0;
-
-  friend bool operator==(const TileAddress&, const TileAddress&) = default;
-};
 
 class TileTemplate {
  public:

@@ -1,4 +1,4 @@
-// Pyramids of tiles on a server, in Web Mercator or geographic coordinates.
+// Tiles of a server by their zoom, column and row.
 #pragma once
 
 #include <array>
@@ -10,8 +10,7 @@
 #include "base/result.h"
 #include "fetch/byte_store.h"
 #include "geo/ellipsoid.h"
-#include "raster/height_codes.h"
-#include "source/raster_source.h"
+#include "source/tiles/tile_pyramid.h"
 
 namespace tellurion::source {
 
@@ -31,13 +30,12 @@ struct TileService {
   int tile_size = 256;                 ///< pixels on a side
   int min_zoom = 0;
   int max_zoom = 18;
-  std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees, west < east: nothing lies outside
-  std::optional<std::string> vertical; ///< as GdalOptions::vertical; only "ellipsoid" so far
+  std::optional<std::array<double, 4>> bounds;  ///< as TilePyramid::bounds
+  std::optional<std::string> vertical; ///< as GdalOptions::vertical
 };
 
 /// A source over `service`; `store` brings the bytes and is shared by all. Nothing is asked of the server yet.
-/// Its readers answer `pending` while tiles are on their way. A tile that does not exist shows what the coarser ones hold.
-/// Errors: invalid_argument (template, zooms, sizes), those of the projection.
+/// Errors: invalid_argument (template, zooms, sizes), and those of open_pyramid.
 Result<std::unique_ptr<RasterSource>> open_tiles(const TileService& service, const geo::Ellipsoid& world,
                                                  std::shared_ptr<fetch::ByteStore> store);
 
