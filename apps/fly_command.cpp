@@ -114,7 +114,6 @@ int fly(const FlyOptions& options) {
       if (now < elapsed) std::this_thread::sleep_for(std::chrono::duration<double>(elapsed - now));
     }
     const view::Pose pose = flight->pose_at(flight->start_s() + elapsed);
-    ground.check(pose.position, options.view.exaggeration);
     const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                           to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
     globe::ViewSettings settings = options.view;
@@ -126,6 +125,7 @@ int fly(const FlyOptions& options) {
     if (!options.realtime) {
       const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
       complete &= (*view)->finish(camera, settings, deadline);
+      ground.check(pose.position, options.view.exaggeration);  // may wait for data, which the picture has brought
     }
     globe::FrameStats stats = (*view)->draw(camera, settings);
     stats.frame = frame;

@@ -164,7 +164,9 @@ GroundWarning::GroundWarning(const globe::Globe& globe) {
 
 void GroundWarning::check(const geo::Geodetic& eye, double exaggeration) {
   if (!sampler_) return;
-  const auto ground = sampler_->height_at(geo::place_of(eye));
+  constexpr double kShareOfHeight = 0.01;  // finer data would have to be fetched for nothing
+  const Metres spacing(kShareOfHeight * std::max(eye.height.value, 0.0));
+  const auto ground = sampler_->height_at(geo::place_of(eye), globe::HeightLookup::bilinear, spacing);
   if (!ground || eye.height.value >= exaggeration * ground->height.value) return;
   fmt::print(stderr, "tellurion: the camera, {:.0f} m above the ellipsoid, is below the ground at {:.0f} m{}: heights of cameras do not count from the ground\n",
              eye.height.value, exaggeration * ground->height.value, exaggeration != 1.0 ? " (exaggerated)" : "");

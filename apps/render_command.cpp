@@ -39,7 +39,6 @@ int render(const Options& options) {
   if (!view) return report(view.error());
 
   const view::Pose pose = camera_or_home(options, **globe);
-  GroundWarning(**globe).check(pose.position, options.view.exaggeration);
   const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                         to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
   std::string trace = globe::trace_header();
@@ -52,6 +51,7 @@ int render(const Options& options) {
   }
   globe::SummaryStats summary;
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  if (!options.after_ms) GroundWarning(**globe).check(pose.position, options.view.exaggeration);  // by data that the picture has brought
 
   const raster::Image picture = (*view)->picture(camera, options.view);
   if (const auto written = globe::write_png(options.out, picture); !written) return report(written.error());

@@ -32,6 +32,7 @@ class CachedRaster {
   /// Whether a read since the last call met blocks that are on their way, and what brings them.
   /// Heights that are not there yet read as 0, so that all that is wanted is asked for at once; colours answer `pending`.
   bool take_pending(source::Awaited& awaited);
+  bool is_pending() const { return pending_; }
 
   /// Bilinear heights at `pixels` (continuous, of level 0), from the samples of `level`.
   /// Between 0.5 pixels inside and the border the outermost samples are continued. NaN pixels: coverage 0.

@@ -1,9 +1,11 @@
-// Something that is on its way: who needs it can ask, wait, or be told.
+// Something that is on its way: who needs it can ask, wait, be told, or say how much it is worth.
 // Thread-safe.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <stop_token>
 #include <utility>
@@ -11,8 +13,20 @@
 
 namespace tellurion::fetch {
 
+/// What a transfer's end gains, in any unit: of several, the greatest begins first. May change while it waits.
+using Gain = std::shared_ptr<std::atomic<double>>;
+
+inline Gain make_gain(double value) { return std::make_shared<std::atomic<double>>(value); }
+
 class Arrival {
  public:
+  explicit Arrival(Gain gain = make_gain(0), double expected_bytes = 0) : gain_(std::move(gain)), expected_bytes_(expected_bytes) {}
+
+  void set_gain(double gain) { gain_->store(gain, std::memory_order_relaxed); }
+  double gain() const { return gain_->load(std::memory_order_relaxed); }
+  /// By what has come from the same place before; 0: nothing has.
+  double expected_bytes() const { return expected_bytes_; }
+
   bool over() const {
     std::lock_guard lock(mutex_);
     return over_;
@@ -49,6 +63,8 @@ class Arrival {
   }
 
  private:
+  const Gain gain_;
+  const double expected_bytes_;
   mutable std::mutex mutex_;
   mutable std::condition_variable_any changed_;
   bool over_ = false;

@@ -103,11 +103,12 @@ void ByteStore::State::abandoned(const std::string& key, std::uint64_t number) {
 /// Starts a transfer; called with the mutex held.
 Asked ByteStore::State::begin(const Request& request, double gain) {
   const std::uint64_t number = ++flight_number;
-  std::shared_ptr<Arrival> arrival(new Arrival, [weak = weak_from_this(), key = request.key, number](Arrival* gone) {
+  const Gain order = make_gain(gain);
+  std::shared_ptr<Arrival> arrival(new Arrival(order, request.expected_bytes), [weak = weak_from_this(), key = request.key, number](Arrival* gone) {
     if (const auto state = weak.lock()) state->abandoned(key, number);
     delete gone;
   });
-  const auto ticket = fetcher->start(request, gain, [weak = weak_from_this(), request, number](Outcome outcome) {
+  const auto ticket = fetcher->start(request, order, [weak = weak_from_this(), request, number](Outcome outcome) {
     if (const auto state = weak.lock()) state->arrived(request, number, std::move(outcome));
   });
   flights[request.key] = {arrival, ticket, number};

@@ -37,7 +37,7 @@ using HeaderList = std::unique_ptr<curl_slist, HeaderDeleter>;
 struct Transfer {
   Fetcher::Ticket ticket = 0;
   Request request;
-  double gain = 0;
+  Gain gain;
   Done done;
   int attempts = 0;
   Clock::time_point not_before{};  ///< of the next attempt
@@ -199,13 +199,14 @@ struct Fetcher::State {
 std::unique_ptr<Transfer> Fetcher::State::next_due(Clock::time_point now, Clock::time_point& wake) {
   std::lock_guard lock(mutex);
   auto best = waiting.end();
+  double greatest = 0;
   for (auto it = waiting.begin(); it != waiting.end(); ++it) {
     const Transfer& transfer = *it->second;
     if (transfer.not_before > now) {
       wake = std::min(wake, transfer.not_before);
-    } else if (best == waiting.end() || transfer.gain > best->second->gain ||
-               (transfer.gain == best->second->gain && transfer.ticket < best->second->ticket)) {
+    } else if (const double gain = *transfer.gain; best == waiting.end() || gain > greatest || (gain == greatest && transfer.ticket < best->second->ticket)) {
       best = it;
+      greatest = gain;
     }
   }
   if (best == waiting.end()) return nullptr;
@@ -394,10 +395,10 @@ Fetcher::~Fetcher() {
   curl_multi_cleanup(state_->multi);
 }
 
-Fetcher::Ticket Fetcher::start(Request request, double gain, Done done) {
+Fetcher::Ticket Fetcher::start(Request request, Gain gain, Done done) {
   auto transfer = std::make_unique<Transfer>();
   transfer->request = std::move(request);
-  transfer->gain = gain;
+  transfer->gain = std::move(gain);
   transfer->done = std::move(done);
   Ticket ticket = 0;
   {
@@ -411,11 +412,6 @@ Fetcher::Ticket Fetcher::start(Request request, double gain, Done done) {
   }
   transfer->done(Error{ErrorCode::cancelled, public_part(transfer->request.url)});
   return ticket;
-}
-
-void Fetcher::set_gain(Ticket ticket, double gain) {
-  std::lock_guard lock(state_->mutex);
-  if (const auto found = state_->waiting.find(ticket); found != state_->waiting.end()) found->second->gain = gain;
 }
 
 void Fetcher::cancel(Ticket ticket) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "fetch/arrival.h"
 #include "fetch/transfer.h"
 
 namespace tellurion::fetch {
@@ -45,9 +46,7 @@ class Fetcher {
 
   /// Begins as soon as the limits allow, the greatest `gain` first. `done` is called once, on the network thread; it must be
   /// quick and may start further transfers.
-  Ticket start(Request request, double gain, Done done);
-  /// A new place in the order; nothing if the transfer is under way or over.
-  void set_gain(Ticket ticket, double gain);
+  Ticket start(Request request, Gain gain, Done done);
   /// Ends the transfer, in flight or not, as cancelled. Nothing if it is over.
   void cancel(Ticket ticket);
 

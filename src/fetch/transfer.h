@@ -16,8 +16,9 @@ namespace tellurion::fetch {
 struct Request {
   std::string url;                   ///< http: or https:; may hold credentials
   std::vector<std::string> headers;  ///< "Name: value"; may hold credentials
-  std::string key{};                   ///< names the bytes in caches; holds no credentials
-  std::string etag;                  ///< of bytes that are there already: only others are sent
+  std::string key{};                 ///< names the bytes in caches; holds no credentials
+  std::string etag{};                ///< of bytes that are there already: only others are sent
+  double expected_bytes = 0;         ///< see Arrival
 };
 
 /// The end of a transfer that the server answered.

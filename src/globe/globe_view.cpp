@@ -23,6 +23,7 @@ constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
+constexpr double kRootGain = 1e9;          ///< nothing can be shown truly without the roots
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -52,11 +53,22 @@ WaitingPart waiting_part(const geo::TileKey& key, Part part, source::Awaited awa
   return waiting;
 }
 
+/// Screen error gained per byte, for what a part waits for. Files of which nothing is known count as 16 KB.
+double gain_of(const WaitingPart& part, double gain_px) {
+  constexpr double kUsualBytes = 16384;
+  double bytes = 1;
+  for (const auto& arrival : part.awaited) {
+    if (!arrival->over()) bytes += arrival->expected_bytes() > 0 ? arrival->expected_bytes() : kUsualBytes;
+  }
+  return gain_px / bytes;
+}
+
 /// The last height found under the eye; written by a worker, read by the render thread.
 struct GroundAnswer {
   std::atomic<bool> known{false};
   std::atomic<bool> asked{false};
   std::atomic<double> metres{0.0};
+  source::Awaited awaited;  ///< what the next answer waits for; the worker's while `asked`
 };
 
 render::FrameLook look_of(const ViewSettings& settings, const World& world, const view::Camera& camera) {
@@ -125,6 +137,7 @@ struct GlobeView::State {
   bool submit(const geo::TileKey& key, Part part);
   void renew_roots();
   void resume_waiting();
+  void order_waiting();
   void take_over(double upload_ms);
   void take_over(Finished item);
   void wait_for_half(Clock::time_point deadline);
@@ -174,6 +187,17 @@ void GlobeView::State::resume_waiting() {
     ++stats.requests_cancelled;
     return true;
   });
+}
+
+/// What gains most is fetched first, as this frame's camera sees it. Files that several parts wait for count by the best of them.
+void GlobeView::State::order_waiting() {
+  for (const WaitingPart& part : waiting) {
+    for (const auto& arrival : part.awaited) arrival->set_gain(0);
+  }
+  for (const WaitingPart& part : waiting) {
+    const double gain = part.key.level == 0 ? kRootGain : gain_of(part, tree.gain_px(part.key, part.part));
+    for (const auto& arrival : part.awaited) arrival->set_gain(std::max(arrival->gain(), gain));
+  }
 }
 
 void GlobeView::State::ask(const surface::TileRequest& request) {
@@ -275,6 +299,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   selection = &tree.select(camera, selection_of(settings, max_bytes), before_select);
   stats.select_ms = ms_since(before_select);
 
+  order_waiting();
   for (const surface::TileRequest& request : selection->requests) {
     if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting) break;
     ask(request);
@@ -454,10 +479,16 @@ std::optional<EllipsoidalHeight> GlobeView::ground_below(const view::Camera& cam
   State& s = *state_;
   auto answer = s.ground;
   if (!answer->asked.exchange(true)) {
-    const geo::LatLon place = geo::place_of(geo::to_geodetic(s.globe.ellipsoid(), camera.eye));
-    const bool submitted = s.globe.try_submit([answer, place, surface = s.globe.surface()](SurfaceWorker& worker) {
+    const geo::Geodetic eye = geo::to_geodetic(s.globe.ellipsoid(), camera.eye);
+    // From far above the coarse data will do: the finest may have to be fetched.
+    constexpr double kShareOfHeight = 0.01;
+    const double spacing = std::max(eye.height.value, 0.0) * kShareOfHeight;
+    const bool submitted = s.globe.try_submit([answer, place = geo::place_of(eye), spacing, surface = s.globe.surface()](SurfaceWorker& worker) {
       if (const auto model = worker.elevation(surface)) {
-        if (const auto height = (*model)->height_at(place, surface::Lookup::bilinear)) {
+        const auto height = (*model)->height_at(place, surface::Lookup::bilinear, spacing);
+        answer->awaited.clear();
+        const bool pending = (*model)->take_pending(answer->awaited);
+        if (height && !pending) {
           answer->metres = height->metres;
           answer->known = true;
         }

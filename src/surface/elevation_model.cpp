@@ -160,6 +160,10 @@ struct ElevationModel::LatticeBatch final : Batch {
   std::vector<glm::dvec2>& room;
 };
 
+bool ElevationModel::is_pending() const {
+  return std::any_of(layers_.begin(), layers_.end(), [](const auto& layer) { return layer.raster.is_pending(); });
+}
+
 bool ElevationModel::take_pending(source::Awaited& awaited) {
   bool pending = false;
   for (HeightLayer& layer : layers_) {

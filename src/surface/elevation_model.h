@@ -75,6 +75,8 @@ class ElevationModel {
 
   /// Whether an answer since the last call rests on samples that are on their way and stand in as 0; and what brings them.
   bool take_pending(source::Awaited& awaited);
+  /// Whether it would say yes: what was read will be thrown away.
+  bool is_pending() const;
 
   /// The enabled height layers' rasters, lowest first, and the settings of each.
   std::size_t layer_count() const { return layers_.size(); }

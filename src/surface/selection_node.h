@@ -31,6 +31,7 @@ struct Node;
 struct NodePart {
   PartLife life;
   FrameNumber wanted = 0;       ///< last frame that asked for it
+  double gain_px = 0;           ///< screen error that it would have taken away then
   FrameNumber used = 0;         ///< last frame that could have drawn it
   Node* older = nullptr;        ///< neighbours in UseOrder; null if it is not listed
   Node* newer = nullptr;
@@ -64,6 +65,7 @@ struct Node {
   double bound_m = 0;           ///< and at most
   double geometry_px = 0;
   double texel_share = 0;       ///< see visible_share
+  bool colour_suffices = false; ///< its texels, or those of an ancestor, are as fine as wanted
   double error_px = 0;
   Node* colour_owner = nullptr; ///< the nearest with colour of its own, and the nearest of those whose colour is resident
   Node* colour_shown = nullptr;

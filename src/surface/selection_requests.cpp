@@ -4,12 +4,6 @@
 #include <tuple>
 
 namespace tellurion::surface {
-namespace {
-
-constexpr int kLevelsBetweenSteps = 3;
-
-}  // namespace
-
 void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& requests, SelectionStats& stats) {
   requests_.clear();
   stats.tiles_waiting = 0;
@@ -28,6 +22,7 @@ void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& re
 
 void RequestList::want(const SelectionFrame& frame, Node& node, Part part, double gain_px) {
   NodePart& wanted = node.part(part);
+  wanted.gain_px = wanted.wanted == frame.number ? std::max(wanted.gain_px, gain_px) : std::max(gain_px, 0.0);
   wanted.wanted = frame.number;
   if (const auto* failed = std::get_if<Failed>(&wanted.life)) retries_later_ = retries_later_ || failed->retry_at != TimePoint::max();
   if (!can_request(wanted.life, frame.now)) return;
@@ -60,7 +55,7 @@ void RequestList::collect(const SelectionFrame& frame, Node& node, const Node* s
   // Errors of a stand-in are taken where the node is. Without one, finer tiles are drawn: nothing is lost by waiting.
   const double shown_px = shown != nullptr ? to_pixels(frame.errors, shown->error_m, node.distance) : 0;
   if (node.split) {
-    const bool is_step = shown != nullptr && (node.key.level - shown->key.level) % kLevelsBetweenSteps == 0;
+    const bool is_step = shown != nullptr && node.key.level % kOutlookLevels == 0;
     if (is_step && !has_geometry) want(frame, node, Part::geometry, shown_px);
     if (is_step) want_colour(frame, node);
     for (int i = 0; i < 4; ++i) collect(frame, node.children[i], shown, stats);

@@ -18,14 +18,32 @@ struct HeightRange {
   double highest = 0;
 };
 
-/// Bounds of the displayed heights. Where facts give no error a tile is judged once it has been built, and then by its own
-/// range; cut to the facts' range, so that what was culled before it arrived is culled after.
-HeightRange heights_of(const Node& node, double exaggeration) {
-  double lowest = node.facts.min_height;
-  double highest = node.facts.max_height;
+/// What the nearest ancestor with an outlook foretells; null if none has one.
+const Outlook::Block* foretold(const Node& node) {
+  for (const Node* above = node.parent; above != nullptr; above = above->parent) {
+    if (above->key.level % kOutlookLevels == 0 && above->built && above->built->metrics.outlook)
+      return &above->built->metrics.outlook->of(above->key, node.key);
+  }
+  return nullptr;
+}
+
+/// Where facts only assume, a tile of every third level is built before anything below it is asked for: its outlook tells what.
+/// One that cannot be built leaves that to those above it.
+bool waits_for_outlook(const Node& node) {
+  return node.facts.assumed && node.key.level % kOutlookLevels == 0 && !(node.built && node.built->metrics.outlook) &&
+         !std::holds_alternative<Failed>(node.part(Part::geometry).life);
+}
+
+/// Bounds of the displayed heights: the outlook's before the facts', if there is one. Where facts give no error a tile is judged
+/// once it has been built, and then by its own range; cut to that before, so that what was culled before it arrived is culled
+/// after.
+HeightRange heights_of(const Node& node, const Outlook::Block* outlook, double exaggeration) {
+  double lowest = outlook != nullptr ? outlook->min_height : node.facts.min_height;
+  double highest = outlook != nullptr ? outlook->max_height : node.facts.max_height;
   if (node.built && !node.facts.height_error) {
-    lowest = std::clamp<double>(node.built->metrics.min_height, lowest, highest);
-    highest = std::clamp<double>(node.built->metrics.max_height, lowest, highest);
+    const double low = node.built->metrics.min_height, high = node.built->metrics.max_height;
+    lowest = std::clamp(low, lowest, highest);
+    highest = std::clamp(high, lowest, highest);
   }
   return {lowest * exaggeration, highest * exaggeration};
 }
@@ -33,8 +51,11 @@ HeightRange heights_of(const Node& node, double exaggeration) {
 void inherit_owners(Node& node) {
   Node* const parent = node.parent;
   const bool has_colour = node.resident(Part::colour) != nullptr;
-  node.colour_owner = node.facts.own_colour ? &node : parent->colour_owner;
-  node.colour_shown = parent == nullptr || (node.facts.own_colour && has_colour) ? &node : parent->colour_shown;
+  const bool owns_colour = node.facts.own_colour && (parent == nullptr || !parent->colour_suffices);
+  node.colour_owner = owns_colour ? &node : parent->colour_owner;
+  const bool has_owners = node.colour_owner->resident(Part::colour) != nullptr;
+  if (has_owners || parent == nullptr) node.colour_shown = node.colour_owner;
+  else node.colour_shown = node.facts.own_colour && has_colour ? &node : parent->colour_shown;
 
   // An owner that turned out to hold no slopes passes the question on.
   const bool owns_slopes = node.facts.own_slopes && (!node.built || node.built->has_slopes);
@@ -66,7 +87,9 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
   if (node.seen == frame.number) return;
   node.seen = frame.number;
   node.split = false;
-  const HeightRange heights = heights_of(node, frame.settings.exaggeration);
+  // Never its own outlook, and never its own range where the outlook above tells one: what was built by chance must not matter.
+  const Outlook::Block* const outlook = node.facts.assumed ? foretold(node) : nullptr;
+  const HeightRange heights = heights_of(node, outlook, frame.settings.exaggeration);
   if (heights.lowest != node.box_lowest || heights.highest != node.box_highest) {
     node.box = tile_box(pool_.ellipsoid(), node.key, heights.lowest, heights.highest);
     node.box_lowest = heights.lowest;
@@ -78,10 +101,19 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
   node.planes = *planes;
   inherit_owners(node);
 
-  node.error_known = node.facts.height_error.has_value() || node.built.has_value();
+  std::optional<HeightError> known = node.facts.height_error;
+  double max_height = node.facts.max_height;
+  if (known && node.facts.assumed) {
+    known.reset();
+    if (outlook != nullptr) {
+      known = outlook->error;
+      max_height = outlook->max_height;
+    }
+  }
+  node.error_known = known || node.built;
   node.error_m = node.bound_m = 0;
-  if (node.facts.height_error) {
-    const DisplayedError full = displayed_error(frame.errors, {*node.facts.height_error, node.full_grid_error}, node.facts.max_height);
+  if (known) {
+    const DisplayedError full = displayed_error(frame.errors, {*known, node.full_grid_error}, max_height);
     node.error_m = full.judged;
     node.bound_m = full.bound;
   }
@@ -95,10 +127,12 @@ void WantedCut::see(const SelectionFrame& frame, Node& node) const {
   node.geometry_px = to_pixels(frame.errors, std::max(node.error_m, precision_metres(node.shape)), node.distance);
   node.texel_share = visible_share(frame.errors, node.shape, node.box, heights.highest - heights.lowest);
   node.error_px = node.geometry_px;
-  if (node.facts.finer_colour_below) {
-    const double texel_px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share;
-    node.error_px = std::max(node.error_px, texel_px);
-  }
+  // Tiles that are split for their geometry alone go on showing the colours of the one whose texels were fine enough.
+  const double texel_px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share;
+  const bool by_error = frame.settings.metric == LodMetric::screen_space_error;
+  node.colour_suffices = !node.facts.finer_colour_below || (by_error && texel_px <= frame.settings.sse_px) ||
+                         (node.parent != nullptr && node.parent->colour_suffices);
+  if (!node.colour_suffices) node.error_px = std::max(node.error_px, texel_px);
 }
 
 void WantedCut::choose_step(const SelectionFrame& frame, Node& node) const {
@@ -120,7 +154,7 @@ void WantedCut::choose_step(const SelectionFrame& frame, Node& node) const {
 }
 
 bool WantedCut::wants_split(const SelectionFrame& frame, const Node& node) const {
-  if (node.key.level == geo::kMaxTileLevel || !node.error_known) return false;
+  if (node.key.level == geo::kMaxTileLevel || !node.error_known || waits_for_outlook(node)) return false;
   const bool has_more = node.error_px > kNothingToGain * effective_sse_px_;
   const double distance = std::max(node.distance, kNearestDistance);
   switch (frame.settings.metric) {

@@ -13,6 +13,8 @@ struct TileFacts {
   float max_height = 0;
   std::optional<HeightError> height_error;  ///< of the tile's own height grid, at least that of every descendant.
                                             ///< Nothing: known once it is built
+  bool assumed = false;               ///< heights and error above are what any terrain could have: built tiles know better,
+                                      ///< of themselves and of their descendants (Outlook)
   bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
   bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels

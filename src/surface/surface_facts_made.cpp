@@ -37,6 +37,7 @@ class MadeFacts final : public SurfaceFacts {
       if (found.own) facts.height_error = found.record.error;
     }
     const double spacing = nominal_grid_spacing(ellipsoid, key.level);
+    facts.assumed = assumed;
     if (assumed) {
       facts.min_height = std::min(facts.min_height, kAssumedMinHeight);
       facts.max_height = std::max(facts.max_height, kAssumedMaxHeight);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "surface/height_field.h"
+#include "surface/outlook.h"
 #include "surface/rtin.h"
 #include "surface/slope_map.h"
 #include "surface/tile_grid.h"
@@ -26,12 +27,18 @@ double wanted_spacing(const SurfaceFacts& facts, const geo::Ellipsoid& ellipsoid
   return facts.facts_of(key).height_error ? nominal_grid_spacing(ellipsoid, key.level) : 0.0;
 }
 
-/// What the parent level's full grid shows at the grid points of its child `key`.
-Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key) {
+/// What the parent level's full grid shows at the grid points of its child `key`. Where the parent's data would have to be
+/// fetched for that, every other of the child's own `heights` stands for them.
+Result<std::vector<double>> parent_heights(ElevationModel& model, const SurfaceFacts& facts, const geo::TileKey& key, bool is_far,
+                                           std::span<const double> own) {
   constexpr int kHalf = kCells / 2 + 1;
   std::vector<double> coarse(static_cast<std::size_t>(kHalf) * kHalf);
-  const double spacing = wanted_spacing(facts, model.description().ellipsoid, geo::parent(key));
-  if (Result<void> read = model.heights(TileLattice{key, kHalf}, spacing, coarse); !read) return read.error();
+  if (is_far) {
+    coarse = every_other(own, kGridSide);
+  } else {
+    const double spacing = wanted_spacing(facts, model.description().ellipsoid, geo::parent(key));
+    if (Result<void> read = model.heights(TileLattice{key, kHalf}, spacing, coarse); !read) return read.error();
+  }
   // A child begins at an even column and row of its parent's grid, so both split their cells alike.
   std::vector<double> heights;
   heights.reserve(static_cast<std::size_t>(kGridSide) * static_cast<std::size_t>(kGridSide));
@@ -77,12 +84,31 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
   }
   if (stop.stop_requested()) return Error{ErrorCode::cancelled, "geometry of " + geo::to_string(key)};
 
+  std::shared_ptr<const Outlook> outlook;
+  if (known.assumed) {
+    Foretold foretold = foretell(field->heights);
+    if (known.height_error) {
+      field->error = foretold.error;
+      field->judged_error = static_cast<double>(judged(foretold.error));
+    }
+    outlook = std::make_shared<const Outlook>(std::move(foretold.outlook));
+  }
+
   std::vector<double> parents = field->heights;
   if (key.level > 0) {
-    Result<std::vector<double>> coarse = parent_heights(model, facts, key);
+    Result<std::vector<double>> coarse = parent_heights(model, facts, key, known.assumed, field->heights);
     if (!coarse) return coarse.error();
     parents = std::move(coarse).value();
   }
+
+  SlopeMap slopes;
+  if (known.own_slopes) {
+    Result<SlopeMap> built = build_slopes(model, key, stop);
+    if (!built) return built.error();
+    slopes = std::move(built).value();
+  }
+  // All has been asked for; what follows would be thrown away.
+  if (model.is_pending()) return Error{ErrorCode::pending, "geometry of " + geo::to_string(key)};
 
   const geo::Ellipsoid& ellipsoid = model.description().ellipsoid;
   const double least = settings.of_tile_size * nominal_tile_size(ellipsoid, key.level);
@@ -90,6 +116,7 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
   DecimatedMesh decimated = make_tile_mesh(ellipsoid, key, field->normals, field->heights, parents, tolerance, settings.limits);
 
   TileGeometry geometry;
+  geometry.metrics.outlook = std::move(outlook);
   geometry.mesh = std::move(decimated.mesh);
   geometry.metrics.mesh_bytes = static_cast<std::uint32_t>(geometry.mesh.bytes());
   geometry.metrics.step_count = static_cast<std::uint8_t>(decimated.steps.size());
@@ -100,11 +127,7 @@ Result<TileGeometry> build_geometry(ElevationModel& model, const SurfaceFacts& f
   // The drawn heights, and the true ones: as the facts have them or within the error of those drawn.
   geometry.metrics.min_height = static_cast<float>(std::min(*lowest, std::max(*lowest - static_cast<double>(field->error.bound), double{known.min_height})));
   geometry.metrics.max_height = static_cast<float>(std::max(*highest, std::min(*highest + static_cast<double>(field->error.bound), double{known.max_height})));
-  if (known.own_slopes) {
-    Result<SlopeMap> slopes = build_slopes(model, key, stop);
-    if (!slopes) return slopes.error();
-    geometry.slopes = std::move(slopes).value();
-  }
+  geometry.slopes = std::move(slopes);
   return geometry;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -30,6 +31,22 @@ struct MeshError {
   float curvature = 0;  ///< largest deviation that comes from the body's curvature alone, metres
 };
 
+inline constexpr int kOutlookLevels = 3;       ///< a tile tells of its descendants so many levels down
+
+/// What a tile's grid says of its descendants where no table does: foretold from its own roughness.
+struct Outlook {
+  struct Block {
+    float min_height = 0;  ///< metres above the ellipsoid, what the grid does not show included
+    float max_height = 0;
+    HeightError error;     ///< of a descendant's full grid
+  };
+  /// Of the children, their children and so on: 4 + 16 + 64, each level row by row (v, then u).
+  std::array<Block, 84> blocks{};
+
+  /// That of `descendant` of `tile`, or of its ancestor kOutlookLevels below `tile` if it lies deeper.
+  const Block& of(const geo::TileKey& tile, geo::TileKey descendant) const;
+};
+
 /// Numbers that decide whether a tile is good enough.
 struct TileMetrics {
   float min_height = 0;  ///< metres above the ellipsoid, of the true and of the drawn surface
@@ -37,6 +54,7 @@ struct TileMetrics {
   std::array<MeshError, kMostMeshSteps> steps{};  ///< of the mesh's steps, finest first
   std::uint8_t step_count = 1;
   std::uint32_t mesh_bytes = 96u << 10;
+  std::shared_ptr<const Outlook> outlook{};  ///< where facts only assume
 };
 
 inline constexpr float kSkirtTop = -1.0f;      ///< the upper border of the skirt, where it meets the surface

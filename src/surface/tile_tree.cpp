@@ -105,6 +105,11 @@ bool TileTree::is_wanted(const geo::TileKey& key, Part part) const {
   return node != nullptr && node->part(part).wanted + kFramesWanted > state_->frame && node->part(part).wanted > 0;
 }
 
+double TileTree::gain_px(const geo::TileKey& key, Part part) const {
+  const Node* node = state_->pool.find(key);
+  return node != nullptr ? node->part(part).gain_px : 0;
+}
+
 std::optional<geo::TileKey> TileTree::eviction_candidate(Part part) const {
   const Node* node = state_->orders[index_of(part)].oldest();
   if (node == nullptr || node->part(part).used == state_->frame) return std::nullopt;

@@ -88,6 +88,8 @@ class TileTree {
 
   /// Whether a started request is still of use (asked again by one of the last frames); a loader may drop it if not.
   bool is_wanted(const geo::TileKey& key, Part part) const;
+  /// Screen error that it would take away, pixels, as the last frame that wanted it saw it.
+  double gain_px(const geo::TileKey& key, Part part) const;
 
   /// The resident part to drop first: not used by the last frame, least recently used, children before parents, never a root.
   /// Used are all tiles that the last frame visited and saw, so the ancestors of what it draws too.

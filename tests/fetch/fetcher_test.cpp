@@ -53,7 +53,7 @@ FetchOptions hasty() {
 Outcome fetch_one(const LittleServer& server, const std::string& path, FetchOptions options = hasty(), std::vector<std::string> headers = {}) {
   Outcomes outcomes;
   Fetcher fetcher(options);
-  fetcher.start({server.url(path), std::move(headers), path, {}}, 0, outcomes.taker(path));
+  fetcher.start({server.url(path), std::move(headers), path, {}}, make_gain(0), outcomes.taker(path));
   return outcomes.wait(1).front().second;
 }
 
@@ -133,8 +133,8 @@ TEST_CASE("Fetcher: cut-off, stalled and endless replies fail; redirects are fol
 TEST_CASE("Fetcher: other protocols are refused, and messages hold no credentials") {
   Outcomes outcomes;
   Fetcher fetcher(hasty());
-  fetcher.start({"file:///etc/passwd", {}, "a", {}}, 0, outcomes.taker("file"));
-  fetcher.start({"http://me:secret@127.0.0.1:1/x?key=secret", {}, "b", {}}, 0, outcomes.taker("dead"));
+  fetcher.start({"file:///etc/passwd", {}, "a", {}}, make_gain(0), outcomes.taker("file"));
+  fetcher.start({"http://me:secret@127.0.0.1:1/x?key=secret", {}, "b", {}}, make_gain(0), outcomes.taker("dead"));
   for (const auto& [name, outcome] : outcomes.wait(2)) {
     REQUIRE_FALSE(outcome);
     CHECK(outcome.error().message.find("secret") == std::string::npos);
@@ -149,11 +149,12 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
   Outcomes outcomes;
   Fetcher fetcher(options);
   std::vector<Fetcher::Ticket> tickets;
+  std::vector<Gain> gains;
   for (const double gain : {9.0, 8.0, 1.0, 5.0, 3.0, 4.0}) {
     const std::string path = fmt::format("/{}", gain);
-    tickets.push_back(fetcher.start({server.url(path), {}, path, {}}, gain, outcomes.taker(path)));
+    tickets.push_back(fetcher.start({server.url(path), {}, path, {}}, gains.emplace_back(make_gain(gain)), outcomes.taker(path)));
   }
-  fetcher.set_gain(tickets[4], 7.0);
+  gains[4]->store(7.0);
   fetcher.cancel(tickets[5]);
   const auto ended = outcomes.wait(6);
   std::vector<std::string> order;
@@ -169,7 +170,7 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
   CHECK(server.most_at_once() <= 2);
 
   Outcomes cut;
-  const auto slow = fetcher.start({server.url("/slow"), {}, "/slow", {}}, 1, cut.taker("/slow"));
+  const auto slow = fetcher.start({server.url("/slow"), {}, "/slow", {}}, make_gain(1), cut.taker("/slow"));
   while (server.asked("/slow") == 0) std::this_thread::sleep_for(1ms);
   const auto start = std::chrono::steady_clock::now();
   fetcher.cancel(slow);

@@ -28,12 +28,13 @@ class ReferenceCut {
   std::map<geo::TileKey, std::pair<geo::TileKey, geo::TileKey>> find(double sse_px) {
     sse_px_ = sse_px;
     found_.clear();
-    for (std::uint8_t face = 0; face < geo::kFaceCount; ++face) visit({face, 0, 0, 0}, {}, {});
+    for (std::uint8_t face = 0; face < geo::kFaceCount; ++face) visit({face, 0, 0, 0}, {}, {}, false);
     return found_;
   }
 
  private:
-  void visit(const geo::TileKey& key, geo::TileKey colour, geo::TileKey slopes) {
+  /// `fine_enough`: an ancestor's texels are within the wanted error, and its slot serves all below it.
+  void visit(const geo::TileKey& key, geo::TileKey colour, geo::TileKey slopes, bool fine_enough) {
     const TileFacts facts = planet_.facts_of(key);
     const TileMetrics built = planet_.metrics_of(key);
     const double x = settings_.exaggeration;
@@ -42,7 +43,7 @@ class ReferenceCut {
     const double high = (tabled ? facts.max_height : std::min(built.max_height, facts.max_height)) * x;
     const OrientedBox box = tile_box(planet_.ellipsoid, key, low, high);
     if (!planes_crossed(volume_, box, kAllPlanes) || horizon_.hides(box)) return;
-    if (facts.own_colour || key.level == 0) colour = key;
+    if ((facts.own_colour && !fine_enough) || key.level == 0) colour = key;
     if (key.level == 0 || (facts.own_slopes && planet_.has_slopes(key))) slopes = key;
 
     // Metres, then pixels.
@@ -55,7 +56,7 @@ class ReferenceCut {
     if (tabled) metres = std::max(metres, geometric(height_of(*facts.height_error), sag, facts.max_height));
     const double pixel = std::max(distance_to(box, camera_.eye.xyz), 0.1) * camera_.pixel_angle();
     double error = metres / pixel;
-    if (facts.finer_colour_below) {
+    if (facts.finer_colour_below && !fine_enough) {
       const glm::dvec3 to_eye = camera_.eye.xyz - box.centre;
       const double radius = glm::length(box.half) / glm::length(to_eye);
       double share = 1;
@@ -64,10 +65,12 @@ class ReferenceCut {
         const double spread = shape.cone + std::atan((high - low) / (shape.size / 2)) + std::asin(radius);
         share = std::clamp(settings_.anisotropy * std::cos(std::max(angle - spread, 0.0)), 0.0, 1.0);
       }
-      error = std::max(error, shape.size / 248 / pixel * share);
+      const double texel = shape.size / 248 / pixel * share;
+      error = std::max(error, texel);
+      fine_enough = texel <= settings_.sse_px;
     }
     if (error > sse_px_ && key.level < geo::kMaxTileLevel) {
-      for (int i = 0; i < 4; ++i) visit(geo::child(key, i), colour, slopes);
+      for (int i = 0; i < 4; ++i) visit(geo::child(key, i), colour, slopes, fine_enough);
     } else {
       found_[key] = {colour, slopes};
     }

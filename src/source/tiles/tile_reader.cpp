@@ -146,7 +146,8 @@ Result<Frozen<Data>> TileReader::tile(const TileAddress& address) {
     return kept.front().tile;
   }
   const TileSupply& supply = *layout_->pyramid.supply;
-  fetch::Asked asked = supply.ask(address, -static_cast<double>(address.zoom));
+  // Until a frame knows better the coarse ones go first, after all that frames have ordered.
+  fetch::Asked asked = supply.ask(address, {-static_cast<double>(address.zoom), layout_->mean_bytes});
   if (auto* arrival = std::get_if<std::shared_ptr<fetch::Arrival>>(&asked)) {
     awaited_.push_back(std::move(*arrival));
     return Error{ErrorCode::pending, supply.name_of(address)};
@@ -155,6 +156,9 @@ Result<Frozen<Data>> TileReader::tile(const TileAddress& address) {
   const fetch::File& file = std::get<fetch::File>(asked);
   Frozen<Data> tile;
   if (file.bytes && !file.bytes->empty()) {
+    constexpr double kNewShare = 0.1;
+    const double mean = layout_->mean_bytes, size = static_cast<double>(file.bytes->size());
+    layout_->mean_bytes = mean > 0 ? mean + kNewShare * (size - mean) : size;
     Result<Data> decoded = decode<Data>(*file.bytes);
     if (!decoded) {
       const bool page = file.content_type.starts_with("text/");

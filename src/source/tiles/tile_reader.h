@@ -1,6 +1,7 @@
 // Windows of a pyramid's levels out of its tiles.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -22,6 +23,7 @@ struct PyramidLayout {
   geo::Ellipsoid world;
   PixelRange range;      ///< of level 0: what there is
   std::string vertical;  ///< what VerticalDatum::create takes; empty: heights are above the ellipsoid already
+  mutable std::atomic<double> mean_bytes{0};  ///< of a tile, of those seen so far
 
   /// The level of the raster as if it were a level of tiles of its own.
   TileLevel level_of_raster(int level) const;

@@ -14,7 +14,9 @@ class UrlTiles final : public TileSupply {
     for (const TileLevel& level : grid.levels) rows_.push_back(level.rows);
   }
 
-  fetch::Asked ask(const TileAddress& tile, double gain) const override { return store_->ask({url_of(tile), headers_, key_of(tile), {}}, gain); }
+  fetch::Asked ask(const TileAddress& tile, const TileWish& wish) const override {
+    return store_->ask({url_of(tile), headers_, key_of(tile), {}, wish.expected_bytes}, wish.gain);
+  }
   void reject(const TileAddress& tile, const std::string& why) const override { store_->reject(key_of(tile), why); }
   std::string name_of(const TileAddress& tile) const override { return fetch::public_part(url_of(tile)); }
 
