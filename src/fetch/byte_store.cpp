@@ -1,5 +1,6 @@
 #include "fetch/byte_store.h"
 
+#include <algorithm>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -24,6 +25,7 @@ struct Entry {
   std::variant<File, Error> content;
   Steady::time_point valid_until;
   std::size_t bytes = 0;
+  int failures = 0;  ///< in a row
 };
 
 }  // namespace
@@ -51,6 +53,7 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
 
   std::optional<Asked> find(const std::string& key);
   void keep(std::string key, std::variant<File, Error> content, Steady::duration lifetime);
+  void keep_failure(const std::string& key, Error error);
   void forget(const std::string& key);
   Asked begin(const Request& request, double gain);
   std::variant<File, Error> take(const Request& request, Outcome outcome);
@@ -76,6 +79,15 @@ void ByteStore::State::keep(std::string key, std::variant<File, Error> content, 
   while (entries.size() > 1 && bytes > options.memory_bytes) forget(std::string(entries.back().key));
 }
 
+/// Asked for again after a pause, a longer one each time.
+void ByteStore::State::keep_failure(const std::string& key, Error error) {
+  constexpr int kMostDoublings = 10;
+  const auto last = index.find(key);
+  const int failures = last != index.end() ? std::min(last->second->failures, kMostDoublings) : 0;
+  keep(key, std::move(error), std::min(options.pause_after_failure * (1 << failures), options.longest_pause));
+  index.find(key)->second->failures = failures + 1;
+}
+
 /// What memory has, or the flight that brings it.
 std::optional<Asked> ByteStore::State::find(const std::string& key) {
   if (const auto found = index.find(key); found != index.end()) {
@@ -83,7 +95,7 @@ std::optional<Asked> ByteStore::State::find(const std::string& key) {
       entries.splice(entries.begin(), entries, found->second);
       return std::visit([](const auto& content) { return Asked(content); }, found->second->content);
     }
-    forget(key);
+    if (found->second->failures == 0) forget(key);
   }
   if (const auto flying = flights.find(key); flying != flights.end()) {
     if (auto arrival = flying->second.arrival.lock()) return Asked(std::move(arrival));
@@ -147,11 +159,12 @@ void ByteStore::State::arrived(const Request& request, std::uint64_t number, Out
       flights.erase(flying);
     }
     if (!cancelled) {
-      const bool failed = std::holds_alternative<Error>(content);
-      const bool missing = !failed && !std::get<File>(content).bytes;
-      const Steady::duration lifetime = failed ? Steady::duration(options.pause_after_failure)
-                                               : missing ? Steady::duration(options.negative_lifetime) : Steady::duration(options.default_lifetime);
-      keep(request.key, std::move(content), lifetime);
+      if (auto* error = std::get_if<Error>(&content)) {
+        keep_failure(request.key, std::move(*error));
+      } else {
+        const bool missing = !std::get<File>(content).bytes;
+        keep(request.key, std::move(content), missing ? Steady::duration(options.negative_lifetime) : Steady::duration(options.default_lifetime));
+      }
     }
   }
   if (arrival) arrival->end();
@@ -198,7 +211,7 @@ void ByteStore::reject(const std::string& key, const std::string& why) {
   State& s = *state_;
   if (s.disk) s.disk->remove(key);
   std::lock_guard lock(s.mutex);
-  s.keep(key, Error{ErrorCode::unavailable, why}, s.options.pause_after_failure);
+  s.keep_failure(key, Error{ErrorCode::unavailable, why});
 }
 
 FetchStats ByteStore::stats() const { return state_->fetcher ? state_->fetcher->stats() : FetchStats{}; }

@@ -381,6 +381,8 @@ Fetcher::Fetcher(const FetchOptions& options) : state_(std::make_unique<State>(o
   state_->multi = curl_multi_init();
   curl_multi_setopt(state_->multi, CURLMOPT_MAX_HOST_CONNECTIONS, static_cast<long>(options.most_per_host));
   curl_multi_setopt(state_->multi, CURLMOPT_MAX_TOTAL_CONNECTIONS, static_cast<long>(options.most_transfers));
+  // Else curl keeps four for every transfer under way and closes them when there are few.
+  curl_multi_setopt(state_->multi, CURLMOPT_MAXCONNECTS, static_cast<long>(2 * options.most_transfers));
   curl_multi_setopt(state_->multi, CURLMOPT_PIPELINING, static_cast<long>(CURLPIPE_MULTIPLEX));
   state_->thread = std::jthread([state = state_.get()] { state->run(); });
 }

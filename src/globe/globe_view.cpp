@@ -23,6 +23,7 @@ constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
+constexpr std::size_t kMostAhead = 32;     ///< of them those that only a later view wants
 constexpr double kRootGain = 1e9;          ///< nothing can be shown truly without the roots
 
 double ms_since(Clock::time_point start) {
@@ -110,6 +111,34 @@ geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& c
   return enu(geo::Vector<geo::Enu>{{-0.5, 0.5, std::sqrt(0.5)}});
 }
 
+/// Where the eye will be if it goes on as it does, but not much nearer to the ground. Nothing if it rests.
+class Motion {
+ public:
+  std::optional<view::Camera> foresee(const geo::Ellipsoid& ellipsoid, const view::Camera& camera, Clock::time_point now) {
+    constexpr double kAhead = 1.0;          // seconds
+    constexpr double kLongestFrame = 0.25;  // after a longer pause it is another motion
+    constexpr double kLeastStep = 1e-4;     // of the height, in the time ahead
+    const double elapsed = std::chrono::duration<double>(now - time_).count();
+    const glm::dvec3 step = camera.eye.xyz - eye_;
+    eye_ = camera.eye.xyz;
+    time_ = now;
+    if (!(elapsed > 0.0 && elapsed < kLongestFrame)) return std::nullopt;
+    const double height = geo::to_geodetic(ellipsoid, camera.eye).height.value;
+    glm::dvec3 way = step * (kAhead / elapsed);
+    if (glm::length(way) < kLeastStep * std::abs(height)) return std::nullopt;
+    view::Camera later = camera;
+    for (int i = 0; i < 4; ++i, way *= 0.5) {
+      later.eye.xyz = eye_ + way;
+      if (geo::to_geodetic(ellipsoid, later.eye).height.value > 0.5 * height) return later;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  glm::dvec3 eye_{0.0};
+  Clock::time_point time_;
+};
+
 struct GlobeView::State {
   State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()) {}
 
@@ -130,6 +159,8 @@ struct GlobeView::State {
   std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
   const surface::Selection* selection = nullptr;
+  Motion motion;
+  std::vector<surface::TileRequest> ahead;  ///< what a later view will want
   FrameStats stats;
 
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
@@ -138,6 +169,7 @@ struct GlobeView::State {
   void renew_roots();
   void resume_waiting();
   void order_waiting();
+  void foresee(const view::Camera& camera, const ViewSettings& settings, Clock::time_point now);
   void take_over(double upload_ms);
   void take_over(Finished item);
   void wait_for_half(Clock::time_point deadline);
@@ -198,6 +230,15 @@ void GlobeView::State::order_waiting() {
     const double gain = part.key.level == 0 ? kRootGain : gain_of(part, tree.gain_px(part.key, part.part));
     for (const auto& arrival : part.awaited) arrival->set_gain(std::max(arrival->gain(), gain));
   }
+}
+
+/// While all that is wanted is there and the eye moves, what it will want next.
+void GlobeView::State::foresee(const view::Camera& camera, const ViewSettings& settings, Clock::time_point now) {
+  ahead.clear();
+  const auto later = motion.foresee(globe.ellipsoid(), camera, now);
+  if (!later || !settings.transitions || selection == nullptr || selection->stats.tiles_waiting > 0) return;
+  const auto requests = tree.foresee(*later, selection_of(settings, max_bytes), now);
+  ahead.assign(requests.begin(), requests.end());
 }
 
 void GlobeView::State::ask(const surface::TileRequest& request) {
@@ -296,6 +337,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   }
   renew_roots();
   const auto before_select = Clock::now();
+  foresee(camera, settings, before_select);
   selection = &tree.select(camera, selection_of(settings, max_bytes), before_select);
   stats.select_ms = ms_since(before_select);
 
@@ -303,6 +345,12 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   for (const surface::TileRequest& request : selection->requests) {
     if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting) break;
     ask(request);
+  }
+  if (selection->requests.empty()) {
+    for (const surface::TileRequest& request : ahead) {
+      if (in_flight >= max_in_flight || waiting.size() >= kMostAhead) break;
+      ask(request);
+    }
   }
 
   const surface::SelectionStats& s = selection->stats;

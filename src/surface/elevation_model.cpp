@@ -68,9 +68,11 @@ WithinRaster bring_within(const source::RasterDescription& raster, int level, co
 }  // namespace
 
 int level_for_spacing(const source::RasterDescription& raster, double wanted_spacing) {
+  // Levels of maps of the whole body have the very spacings of the surface's tiles: rounding must not choose the finer one.
+  constexpr double kAsFine = 1.001;
   const int last = static_cast<int>(raster.levels.size()) - 1;
   int level = 0;
-  while (level < last && spacing_of_level(raster, level + 1) <= wanted_spacing) ++level;
+  while (level < last && spacing_of_level(raster, level + 1) <= kAsFine * wanted_spacing) ++level;
   return level;
 }
 

@@ -73,12 +73,12 @@ std::size_t bytes_of_tile(const TileFacts& facts, std::size_t mesh_bytes) {
 }
 
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
-                          FrameNumber number, TimePoint now) {
+                          FrameNumber number, FrameNumber last, TimePoint now) {
   double lowest = 0;
   for (const Node& root : pool.roots()) lowest = std::min<double>(lowest, root.facts.min_height);
   const ErrorView errors{camera.eye.xyz, camera.pixel_angle(), settings.exaggeration, settings.anisotropy,
                          pool.ellipsoid().a()};
-  return {number, now, settings, errors, make_view_volume(camera),
+  return {number, last, now, settings, errors, make_view_volume(camera),
           Horizon(pool.ellipsoid(), camera.eye.xyz, lowest * settings.exaggeration),
           geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value};
 }

@@ -10,6 +10,7 @@ namespace tellurion::surface {
 /// What a frame is about; shared by all steps of a selection.
 struct SelectionFrame {
   FrameNumber number = 0;
+  FrameNumber last = 0;        ///< the one before that was drawn
   TimePoint now;
   SelectionSettings settings;
   ErrorView errors;
@@ -17,11 +18,11 @@ struct SelectionFrame {
   Horizon horizon;
   double eye_height = 0;       ///< metres above the ellipsoid
   float transition_step = 1;   ///< share of a transition that passes in this frame
-  bool was_drawn(const Node& node) const { return node.drawn + 1 == number; }
+  bool was_drawn(const Node& node) const { return node.drawn == last; }
 };
 
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,
-                          FrameNumber number, TimePoint now);
+                          FrameNumber number, FrameNumber last, TimePoint now);
 
 /// Finds the wanted cut, marks it in the nodes (`seen`, `visible`, `split`) and touches what it visits.
 ///

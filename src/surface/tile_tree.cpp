@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <span>
 #include <utility>
 
 #include "surface/selection_drawn.h"
@@ -28,7 +29,10 @@ struct TileTree::State {
   DrawnCut drawn{pool, wanted, orders};
   RequestList requests{pool};
   Selection selection;
+  WantedCut ahead{pool, orders};
+  Selection foreseen;
   FrameNumber frame = 1;  // node stamps start at 0: no node counts as drawn in the frame before the first
+  FrameNumber drawn_frame = 1;
   TimePoint last_time;
 
   bool has_selected() const { return frame > 1; }
@@ -61,8 +65,9 @@ const Selection& TileTree::select(const view::Camera& camera, const SelectionSet
   assert(std::ranges::all_of(s.pool.roots(), [](const Node& root) { return root.resident(Part::geometry) != nullptr; }));
 
   ++s.frame;
-  SelectionFrame frame = make_frame(s.pool, camera, settings, s.frame, now);
-  const std::chrono::duration<float> elapsed = s.frame > 2 ? now - s.last_time : std::chrono::steady_clock::duration{};
+  SelectionFrame frame = make_frame(s.pool, camera, settings, s.frame, s.drawn_frame, now);
+  s.drawn_frame = s.frame;
+  const std::chrono::duration<float> elapsed = s.last_time != TimePoint{} ? now - s.last_time : std::chrono::steady_clock::duration{};
   frame.transition_step = std::clamp(elapsed / kTransitionTime, 0.0f, 1.0f);
   s.last_time = now;
 
@@ -76,6 +81,18 @@ const Selection& TileTree::select(const view::Camera& camera, const SelectionSet
   stats.complete = stats.tiles_waiting == 0 && stats.tiles_drawn == stats.tiles_selected && !s.drawn.in_transition();
   s.pool.prune(s.frame, now);
   return s.selection;
+}
+
+std::span<const TileRequest> TileTree::foresee(const view::Camera& camera, const SelectionSettings& settings,
+                                               std::chrono::steady_clock::time_point now) {
+  State& s = *state_;
+  s.foreseen.requests.clear();
+  if (settings.frozen || !s.has_selected()) return {};
+  ++s.frame;  // one of its own, in which nothing is drawn
+  const SelectionFrame frame = make_frame(s.pool, camera, settings, s.frame, s.drawn_frame, now);
+  s.ahead.find(frame);
+  s.requests.find(frame, s.foreseen.requests, s.foreseen.stats);
+  return s.foreseen.requests;
 }
 
 void TileTree::started(const geo::TileKey& key, Part part) { state_->happens(state_->pool.at(key), part, Start{}); }

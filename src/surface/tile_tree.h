@@ -78,6 +78,11 @@ class TileTree {
   const Selection& select(const view::Camera& camera, const SelectionSettings& settings,
                           std::chrono::steady_clock::time_point now);
 
+  /// What a later view will ask for besides, the nearest thing to it known: to be loaded while nothing else is wanted. Valid until
+  /// the next call; followed by `select` before anything is dropped.
+  std::span<const TileRequest> foresee(const view::Camera& camera, const SelectionSettings& settings,
+                                       std::chrono::steady_clock::time_point now);
+
   // The life of a part: wanted -> started -> arrived -> released, or failed (wanted again at `retry_at`).
   void started(const geo::TileKey& key, Part part);
   void cancelled(const geo::TileKey& key, Part part);

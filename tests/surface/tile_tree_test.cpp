@@ -550,3 +550,36 @@ TEST_CASE("set_facts: what is resident stays and new facts count at once") {
   for (const DrawTile& tile : after.draw) CHECK(tile.colour_owner.level <= 3);
   CHECK(after.draw.size() <= static_cast<std::size_t>(before));
 }
+
+TEST_CASE("foresee: what it asks for completes the later view, and the view of now stays as it is") {
+  const EvenPlanet planet;
+  const SelectionSettings settings;
+  const view::Camera here = camera_at(planet.ellipsoid, 46, 8, 3e5, 30, -40), there = camera_at(planet.ellipsoid, 47, 8.5, 2.5e5, 30, -40);
+  Flight plain(planet), foreseeing(planet);
+  REQUIRE(plain.finish(here, settings) != nullptr);
+  REQUIRE(foreseeing.finish(here, settings) != nullptr);
+  // Nothing of it is there yet.
+  const std::size_t wanted_there = [&] {
+    Flight other(planet);
+    REQUIRE(other.finish(here, settings) != nullptr);
+    return other.frame(there, settings).requests.size();
+  }();
+  REQUIRE(wanted_there > 0);
+
+  for (int i = 0; i < 40; ++i) {
+    const auto requests = foreseeing.tree.foresee(there, settings, foreseeing.now);
+    Selection ahead;
+    ahead.requests.assign(requests.begin(), requests.end());
+    foreseeing.loader.work(ahead, foreseeing.now, 1000, 1000);
+    CHECK(text_of(foreseeing.frame(here, settings)) == text_of(plain.frame(here, settings)));
+    // What this view draws is not to be dropped, whatever was foreseen.
+    for (const Part part : {Part::geometry, Part::colour}) {
+      const auto dropped = foreseeing.tree.eviction_candidate(part);
+      if (!dropped) continue;
+      for (const DrawTile& tile : foreseeing.frame(here, settings).draw) CHECK(tile.key != *dropped);
+    }
+  }
+  const Selection& arrived = foreseeing.frame(there, settings);
+  CHECK(arrived.stats.tiles_waiting == 0);
+  CHECK(arrived.stats.complete);
+}
