@@ -74,6 +74,7 @@ class TileServer:
 
         self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self.http.daemon_threads = True
+        self.http.handle_error = lambda *_: None  # programs that are killed leave their connections
         threading.Thread(target=self.http.serve_forever, daemon=True).start()
 
     def url(self, path):
