@@ -21,7 +21,7 @@ build_packages=(
   libegl-mesa0 libgl1-mesa-dri                                 # a driver that needs no GPU and no display
   libglfw3-dev libimgui-dev libstb-dev                         # the window
   libcli11-dev libfmt-dev libglm-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
-  libcurl4-openssl-dev libsqlite3-dev                          # tiles from servers, and the disk cache
+  libcurl4-openssl-dev libsqlite3-dev zlib1g-dev               # tiles from servers, and the disk cache
   gdal-bin libgdal-dev libproj-dev proj-bin proj-data
   ffmpeg                                                       # writes the video of a flight
 )
