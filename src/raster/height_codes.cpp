@@ -17,11 +17,8 @@ float metres_of(int r, int g, int b, HeightCode code) {
       return static_cast<float>(number / 256.0 - 32768.0);
     case HeightCode::terrain_rgb:
       return static_cast<float>(number / 10.0 - 10000.0);
-    case HeightCode::centimetres: {
-      constexpr int kSign = 1 << 23;
-      if (number == kSign) return kNoHeight;
-      return static_cast<float>((number < kSign ? number : number - 2 * kSign) / 100.0);
-    }
+    case HeightCode::centimetres:
+      return static_cast<float>(number / 1600.0 - 1000.0);
   }
   return kNoHeight;
 }

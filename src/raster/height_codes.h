@@ -11,11 +11,12 @@
 
 namespace tellurion::raster {
 
-/// How a pixel's red, green and blue (R, G, B) make a height in metres.
+/// How a pixel's red, green and blue (R, G, B) make a height in metres. Colours that are a little off, as lossy compression leaves
+/// them, are heights that are far off.
 enum class HeightCode {
   terrarium,     ///< R * 256 + G + B / 256 - 32768. Source: Mapzen's Joerd, docs/formats.md
   terrain_rgb,   ///< -10000 + (R * 65536 + G * 256 + B) / 10. Source: Mapbox Terrain-RGB v1
-  centimetres,   ///< R * 65536 + G * 256 + B, a signed 24-bit number of centimetres; -2^23: no data
+  centimetres,   ///< (R * 65536 + G * 256 + B) / 1600 - 1000: centimetres above -1000 m, times 16; up to 9485.75 m
 };
 
 /// The name in world files: "terrarium", "terrain-rgb", "centimetres"; nothing for others.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <algorithm>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <gdal_priv.h>
@@ -111,15 +112,17 @@ class MemoryFile {
   std::string path_;
 };
 
-}  // namespace
+/// Whether the pixels are not those that were written: JPEG (alone or in a TIFF) and lossy WebP.
+bool is_lossy(GDALDataset& dataset) {
+  const auto says = [&](const char* item, std::string_view word) {
+    const char* value = dataset.GetMetadataItem(item, "IMAGE_STRUCTURE");
+    return value != nullptr && std::string_view(value).find(word) != std::string_view::npos;
+  };
+  return says("COMPRESSION", "JPEG") || says("COMPRESSION_REVERSIBILITY", "LOSSY");
+}
 
-Result<raster::Image> decode_picture(const std::string& bytes, int largest_side) {
-  prepare_gdal();
-  const MemoryFile file(bytes);
-  Result<Dataset> dataset = file.open(largest_side);
-  if (!dataset) return dataset.error();
+Result<raster::Image> pixels_of(GDALDataset& d) {
   const QuietErrors quiet;
-  GDALDataset& d = *dataset.value();
   raster::Image image{d.GetRasterXSize(), d.GetRasterYSize(), {}};
   const std::size_t count = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   image.rgba.assign(count * 4, 255);
@@ -145,6 +148,25 @@ Result<raster::Image> decode_picture(const std::string& bytes, int largest_side)
   }
   if (!good) return Error{ErrorCode::corrupt, quiet.last()};
   return image;
+}
+
+}  // namespace
+
+Result<raster::Image> decode_picture(const std::string& bytes, int largest_side) {
+  prepare_gdal();
+  const MemoryFile file(bytes);
+  const Result<Dataset> dataset = file.open(largest_side);
+  return dataset ? pixels_of(**dataset) : Result<raster::Image>(dataset.error());
+}
+
+Result<raster::Image> decode_exact_picture(const std::string& bytes, int largest_side) {
+  prepare_gdal();
+  const MemoryFile file(bytes);
+  const Result<Dataset> dataset = file.open(largest_side);
+  if (!dataset) return dataset.error();
+  if (is_lossy(**dataset))
+    return Error{ErrorCode::unsupported, "is compressed with loss, which spoils heights coded as colours; they need PNG or lossless WebP"};
+  return pixels_of(**dataset);
 }
 
 Result<raster::HeightGrid> decode_height_band(const std::string& bytes, int largest_side) {

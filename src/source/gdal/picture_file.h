@@ -23,6 +23,9 @@ Result<raster::Image> read_picture(const std::filesystem::path& file);
 /// messages say what is wrong, not where.
 Result<raster::Image> decode_picture(const std::string& bytes, int largest_side);
 
+/// Likewise a picture whose colours must be exact, as those that code heights. Errors also: unsupported (compressed with loss).
+Result<raster::Image> decode_exact_picture(const std::string& bytes, int largest_side);
+
 /// The first band of such bytes as heights, no-data values as NaN. Errors likewise.
 Result<raster::HeightGrid> decode_height_band(const std::string& bytes, int largest_side);
 

@@ -1,0 +1,71 @@
+#include "source/gdal/picture_file.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <cpl_vsi.h>
+#include <doctest/doctest.h>
+#include <gdal_priv.h>
+
+using namespace tellurion;
+using namespace tellurion::source;
+
+namespace {
+
+constexpr int kSide = 32;
+
+/// The bytes of a file that GDAL writes of a picture of three channels.
+std::string written(const char* format, const std::vector<const char*>& options = {}) {
+  GDALAllRegister();
+  GDALDatasetUniquePtr picture(GetGDALDriverManager()->GetDriverByName("MEM")->Create("", kSide, kSide, 3, GDT_Byte, nullptr));
+  for (int channel = 0; channel < 3; ++channel) {
+    std::array<unsigned char, kSide * kSide> samples{};
+    for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<unsigned char>(i * (7 + static_cast<std::size_t>(channel) * 6));
+    REQUIRE(picture->GetRasterBand(channel + 1)->RasterIO(GF_Write, 0, 0, kSide, kSide, samples.data(), kSide, kSide, GDT_Byte, 0, 0, nullptr) == CE_None);
+  }
+  std::vector<const char*> list = options;
+  list.push_back(nullptr);
+  const char* path = "/vsimem/picture_file_test";
+  GDALClose(GetGDALDriverManager()->GetDriverByName(format)->CreateCopy(path, picture.get(), FALSE, const_cast<char**>(list.data()), nullptr, nullptr));
+  vsi_l_offset size = 0;
+  GByte* bytes = VSIGetMemFileBuffer(path, &size, FALSE);
+  REQUIRE(bytes != nullptr);
+  std::string result(reinterpret_cast<const char*>(bytes), size);
+  VSIUnlink(path);
+  VSIUnlink((std::string(path) + ".aux.xml").c_str());
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("decode_exact_picture: lossless formats give the very pixels that were written") {
+  for (const std::string& bytes : {written("PNG"), written("WEBP", {"LOSSLESS=YES"}), written("GTiff"), written("GTiff", {"COMPRESS=DEFLATE"}),
+                                   written("GTiff", {"COMPRESS=WEBP", "WEBP_LOSSLESS=YES"})}) {
+    const auto picture = decode_exact_picture(bytes, kSide);
+    REQUIRE(picture);
+    CHECK(picture->at(5, 3) == std::array<std::uint8_t, 4>{static_cast<std::uint8_t>(101 * 7), static_cast<std::uint8_t>(101 * 13), static_cast<std::uint8_t>(101 * 19), 255});
+  }
+}
+
+TEST_CASE("decode_exact_picture: what was compressed with loss is refused, and decode_picture reads it") {
+  for (const std::string& bytes : {written("JPEG"), written("JPEG", {"QUALITY=100"}), written("WEBP"), written("GTiff", {"COMPRESS=JPEG"}),
+                                   written("GTiff", {"COMPRESS=JPEG", "PHOTOMETRIC=YCBCR"}), written("GTiff", {"COMPRESS=WEBP"})}) {
+    const auto exact = decode_exact_picture(bytes, kSide);
+    REQUIRE_FALSE(exact);
+    CHECK(exact.error().code == ErrorCode::unsupported);
+    CHECK(exact.error().message.find("lossless") != std::string::npos);
+    CHECK(decode_picture(bytes, kSide));
+  }
+}
+
+TEST_CASE("decode_exact_picture: what is no picture is corrupt, what is too large is not read") {
+  for (const std::string& bytes : {std::string(), std::string("no picture"), written("PNG").substr(0, 20)}) {
+    const auto picture = decode_exact_picture(bytes, kSide);
+    REQUIRE_FALSE(picture);
+    CHECK(picture.error().code == ErrorCode::corrupt);
+  }
+  const auto large = decode_exact_picture(written("PNG"), kSide - 1);
+  REQUIRE_FALSE(large);
+  CHECK(large.error().code == ErrorCode::exhausted);
+}
