@@ -17,6 +17,7 @@
 #include "globe/worker_pool.h"
 #include "fetch/byte_store.h"
 #include "source/gdal/gdal_source.h"
+#include "source/tiles/cesium_terrain.h"
 #include "source/tiles/tiled_source.h"
 
 namespace tellurion::globe {
@@ -53,6 +54,17 @@ source::GdalOptions gdal_options(const LayerSpec& layer) {
   return options;
 }
 
+source::CesiumTerrain cesium_terrain(const LayerSpec& layer) {
+  const SourceSpec& source = layer.source;
+  source::CesiumTerrain terrain;
+  terrain.url = source.url;
+  for (const auto& [name, value] : source.headers) terrain.headers.push_back(name + ": " + value);
+  terrain.tile_size = source.tile_size;
+  if (source.max_level != kEveryLevel) terrain.max_zoom = source.max_level;
+  terrain.vertical = source.vertical;
+  return terrain;
+}
+
 source::TileService tile_service(const LayerSpec& layer) {
   const SourceSpec& source = layer.source;
   source::TileService service;
@@ -61,7 +73,7 @@ source::TileService tile_service(const LayerSpec& layer) {
   for (const auto& [name, value] : source.headers) service.headers.push_back(name + ": " + value);
   service.scheme = source.projection == "geographic" ? source::TileScheme::geographic : source::TileScheme::web_mercator;
   service.kind = kind_of(layer.group);
-  service.code = raster::height_code(source.encoding);
+  service.encoding = source.encoding;
   service.tile_size = source.tile_size;
   service.min_zoom = source.min_level;
   service.max_zoom = source.max_level;
@@ -103,7 +115,10 @@ struct Globe::State {
 };
 
 Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const LayerSpec& spec) {
-  if (spec.source.type == "xyz") {
+  const bool is_terrain = spec.source.type == "cesium-terrain";
+  if (is_terrain && spec.group != LayerGroup::height)
+    return Error{ErrorCode::invalid_argument, fmt::format("{}: holds heights: its layer's group is \"height\"", fetch::public_part(spec.source.url))};
+  if (spec.source.type == "xyz" || is_terrain) {
     if (!store) {
       fetch::StoreOptions how;
       if (!options.cache_folder.empty()) how.disk_file = kept_database(options.cache_folder);
@@ -111,6 +126,7 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
       how.offline = options.offline;
       store = std::make_shared<fetch::ByteStore>(how);
     }
+    if (is_terrain) return source::open_cesium_terrain(cesium_terrain(spec), world.ellipsoid, store);
     return source::open_tiles(tile_service(spec), world.ellipsoid, store);
   }
   source::GdalOptions how = gdal_options(spec);

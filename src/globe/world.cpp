@@ -14,7 +14,7 @@
 
 #include "fetch/transfer.h"
 #include "geo/body.h"
-#include "raster/height_codes.h"
+#include "source/tiles/height_decoders.h"
 
 namespace tellurion::globe {
 namespace {
@@ -97,7 +97,7 @@ class WorldReader {
     } else {
       fail(table, "the layer has no `source`");
     }
-    const std::string unnamed = layer.source.type == "xyz" ? fetch::public_part(layer.source.url) : layer.source.path.stem().string();
+    const std::string unnamed = !layer.source.url.empty() ? fetch::public_part(layer.source.url) : layer.source.path.stem().string();
     layer.name = text(table, "name").value_or(unnamed);
     return layer;
   }
@@ -105,9 +105,10 @@ class WorldReader {
   void read_source(const toml::table& table, SourceSpec& source) {
     source.type = text(table, "type").value_or("gdal");
     if (source.type == "xyz") return read_tiles(table, source);
+    if (source.type == "cesium-terrain") return read_terrain(table, source);
     if (source.type != "gdal") {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("this build reads sources of type \"gdal\" and \"xyz\" only, not \"{}\"", source.type), ErrorCode::unsupported);
+                  fmt::format("this build reads sources of type \"gdal\", \"xyz\" and \"cesium-terrain\" only, not \"{}\"", source.type), ErrorCode::unsupported);
     }
     expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
     if (const auto path = text(table, "path"); path && !path->empty()) {
@@ -144,8 +145,8 @@ class WorldReader {
     if (source.projection != "web-mercator" && source.projection != "geographic")
       fail(*table.get("projection"), "`projection` is \"web-mercator\" or \"geographic\"");
     source.encoding = text(table, "encoding").value_or("");
-    if (!source.encoding.empty() && !raster::height_code(source.encoding))
-      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is terrarium, terrain-rgb or centimetres; without one, heights are the first band's numbers", source.encoding));
+    if (!source.encoding.empty() && !source::is_height_encoding(source.encoding))
+      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
     source.min_level = static_cast<int>(number(table, "min_level", 0, 30).value_or(0));
     source.max_level = static_cast<int>(number(table, "max_level", 0, 30).value_or(18));
@@ -169,15 +170,29 @@ class WorldReader {
         else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
       }
     }
-    if (const toml::node* headers = table.get("headers")) {
-      const toml::table* fields = headers->as_table();
-      if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
-      for (const auto& [name, value] : *fields) {
-        const auto content = value.value_exact<std::string>();
-        const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
-        if (good) source.headers.emplace(name.str(), *content);
-        else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
-      }
+    read_headers(table, source);
+  }
+
+  void read_terrain(const toml::table& table, SourceSpec& source) {
+    expect_keys(table, "source", {"type", "url", "headers", "tile_size", "max_level", "vertical"});
+    source.url = text(table, "url").value_or("");
+    if (!is_web_address(source.url)) fail(table, "the source needs the `url` of a layer.json, for example \"https://host/terrain/layer.json\"");
+    source.vertical = text(table, "vertical");
+    source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(kTerrainSize));
+    source.max_level = static_cast<int>(number(table, "max_level", 0, 29).value_or(kEveryLevel));
+    read_headers(table, source);
+  }
+
+  void read_headers(const toml::table& table, SourceSpec& source) {
+    const toml::node* headers = table.get("headers");
+    if (!headers) return;
+    const toml::table* fields = headers->as_table();
+    if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
+    for (const auto& [name, value] : *fields) {
+      const auto content = value.value_exact<std::string>();
+      const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
+      if (good) source.headers.emplace(name.str(), *content);
+      else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
     }
   }
 
@@ -230,8 +245,12 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   toml::table table;
   table.is_inline(true);
   table.insert("type", source.type);
-  if (source.type == "xyz") {
-    const SourceSpec usual;
+  if (source.type == "xyz" || source.type == "cesium-terrain") {
+    SourceSpec usual;
+    if (source.type == "cesium-terrain") {
+      usual.tile_size = kTerrainSize;
+      usual.max_level = kEveryLevel;
+    }
     table.insert("url", source.url);
     if (!source.subdomains.empty()) {
       toml::array names;

@@ -21,6 +21,9 @@ enum class LayerGroup { height, color, grayscale, grayscale_overlay, water, nigh
 /// The group's name in world files.
 std::string_view name_of(LayerGroup group);
 
+inline constexpr int kEveryLevel = 30;   ///< as SourceSpec::max_level of "cesium-terrain": all that the server says it has
+inline constexpr int kTerrainSize = 128; ///< the usual SourceSpec::tile_size of "cesium-terrain"
+
 /// Where a layer's data come from. `path` is absolute once a world is loaded.
 struct SourceSpec {
   std::string type = "gdal";
@@ -32,12 +35,12 @@ struct SourceSpec {
   std::optional<double> offset;
   std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
 
-  // Of type "xyz"; there `path` is empty.
-  std::string url;                          ///< see source::TileTemplate
+  // Of types "xyz" and "cesium-terrain"; there `path` is empty.
+  std::string url;                          ///< see source::TileTemplate; or of a layer.json
   std::vector<std::string> subdomains;
   std::map<std::string, std::string> headers;
   std::string projection = "web-mercator";  ///< or "geographic"
-  std::string encoding;                     ///< of heights: see raster::height_code; empty: the first band's numbers
+  std::string encoding;                     ///< of heights: see source::height_decoder; empty: the first band's numbers
   int tile_size = 256;
   int min_level = 0;
   int max_level = 18;

@@ -127,6 +127,39 @@ TEST_CASE("to_toml: a source of tiles comes back with all that was said of it") 
   }
 }
 
+TEST_CASE("parse_world: terrain of a layer.json, and back") {
+  const std::string text = "[[layer]]\ngroup = \"height\"\nsource = { type = \"cesium-terrain\", url = \"https://host/terrain/layer.json?token=1\"";
+  const auto usual = parse_world(text + " }\n", "/folder", "w.toml");
+  REQUIRE(usual);
+  CHECK(usual->layers[0].name == "https://host/terrain/layer.json");
+  CHECK(usual->layers[0].source.tile_size == kTerrainSize);
+  CHECK(usual->layers[0].source.max_level == kEveryLevel);
+  const auto said = parse_world(text + ", tile_size = 64, max_level = 9, vertical = \"egm96\", headers = { A = \"b\" } }\n", "/folder", "w.toml");
+  REQUIRE(said);
+  for (const World* world : {&*usual, &*said}) {
+    const auto again = parse_world(to_toml(*world), "/folder", "w.toml");
+    REQUIRE(again);
+    const SourceSpec &before = world->layers[0].source, &after = again->layers[0].source;
+    CHECK(after.type == "cesium-terrain");
+    CHECK(after.url == before.url);
+    CHECK(after.tile_size == before.tile_size);
+    CHECK(after.max_level == before.max_level);
+    CHECK(after.vertical == before.vertical);
+    CHECK(after.headers == before.headers);
+  }
+  CHECK(said->layers[0].source.max_level == 9);
+  CHECK(contains(message_of("[[layer]]\ngroup = \"height\"\nsource = { type = \"cesium-terrain\" }\n"), "w.toml:3: the source needs the `url` of a layer.json"));
+  CHECK(contains(message_of(text + ", encoding = \"heightmap\" }\n"), "no key `encoding`"));
+}
+
+TEST_CASE("parse_world: tiles of heights may be meshes or heightmaps") {
+  for (const std::string encoding : {"quantized-mesh", "heightmap", "centimetres"}) {
+    const auto world = parse_world("[[layer]]\ngroup = \"height\"\nsource = { type = \"xyz\", url = \"http://h/{z}/{x}/{y}\", encoding = \"" + encoding + "\" }\n", "/folder", "w.toml");
+    REQUIRE(world);
+    CHECK(world->layers[0].source.encoding == encoding);
+  }
+}
+
 TEST_CASE("load_world: a file that is not there is named") {
   const auto world = load_world("/no/such/world.toml");
   REQUIRE_FALSE(world);

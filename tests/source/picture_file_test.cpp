@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <cpl_error.h>
 #include <cpl_vsi.h>
 #include <doctest/doctest.h>
 #include <gdal_priv.h>
@@ -27,7 +28,9 @@ std::string written(const char* format, const std::vector<const char*>& options 
   std::vector<const char*> list = options;
   list.push_back(nullptr);
   const char* path = "/vsimem/picture_file_test";
+  CPLPushErrorHandler(CPLQuietErrorHandler);
   GDALClose(GetGDALDriverManager()->GetDriverByName(format)->CreateCopy(path, picture.get(), FALSE, const_cast<char**>(list.data()), nullptr, nullptr));
+  CPLPopErrorHandler();
   vsi_l_offset size = 0;
   GByte* bytes = VSIGetMemFileBuffer(path, &size, FALSE);
   REQUIRE(bytes != nullptr);

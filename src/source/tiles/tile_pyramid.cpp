@@ -121,9 +121,9 @@ Result<std::string> find_datum(const std::optional<std::string>& vertical, bool 
 }  // namespace
 
 HeightDecoder picture_heights(std::optional<raster::HeightCode> code) {
-  if (!code) return [](const std::string& bytes) { return decode_height_band(bytes, kLargestTile); };
-  return [code = *code](const std::string& bytes) -> Result<raster::HeightGrid> {
-    const Result<raster::Image> picture = decode_picture(bytes, kLargestTile);
+  if (!code) return [](const std::string& bytes, const TileAddress&) { return decode_height_band(bytes, kLargestTile); };
+  return [code = *code](const std::string& bytes, const TileAddress&) -> Result<raster::HeightGrid> {
+    const Result<raster::Image> picture = decode_exact_picture(bytes, kLargestTile);
     if (!picture) return picture.error();
     return raster::decode_heights(*picture, code);
   };

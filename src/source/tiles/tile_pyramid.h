@@ -18,9 +18,9 @@
 namespace tellurion::source {
 
 /// A tile's bytes to its heights in metres, NaN where there is no data. Thread-safe. Errors: corrupt, unsupported.
-using HeightDecoder = std::function<Result<raster::HeightGrid>(const std::string& bytes)>;
+using HeightDecoder = std::function<Result<raster::HeightGrid>(const std::string& bytes, const TileAddress& tile)>;
 
-/// Of pictures: by `code`, or without one the first band's numbers.
+/// Of pictures: by `code`, or without one the first band's numbers. Codes in pictures compressed with loss are refused.
 HeightDecoder picture_heights(std::optional<raster::HeightCode> code);
 
 struct TilePyramid {

@@ -120,14 +120,14 @@ std::vector<TileReader::Held<Data>>& TileReader::held() {
 }
 
 template <class Data>
-Result<Data> TileReader::decode(const std::string& bytes) const {
+Result<Data> TileReader::decode(const std::string& bytes, const TileAddress& address) const {
   const TilePyramid& pyramid = layout_->pyramid;
   Result<Data> tile = Error{};
   if constexpr (std::is_same_v<Data, raster::Image>) {
     tile = decode_picture(bytes, kLargestTile);
     if (tile) premultiply(*tile);
   } else {
-    tile = pyramid.decode_heights(bytes);
+    tile = pyramid.decode_heights(bytes, address);
   }
   const TileGrid& grid = pyramid.grid;
   if (tile && (tile->width != grid.tile_width || tile->height != grid.tile_height))
@@ -159,7 +159,7 @@ Result<Frozen<Data>> TileReader::tile(const TileAddress& address) {
     constexpr double kNewShare = 0.1;
     const double mean = layout_->mean_bytes, size = static_cast<double>(file.bytes->size());
     layout_->mean_bytes = mean > 0 ? mean + kNewShare * (size - mean) : size;
-    Result<Data> decoded = decode<Data>(*file.bytes);
+    Result<Data> decoded = decode<Data>(*file.bytes, address);
     if (!decoded) {
       const bool page = file.content_type.starts_with("text/");
       const std::string why = fmt::format("{}: {}{}", supply.name_of(address), decoded.error().message, page ? " (a page of text; is the URL right?)" : "");

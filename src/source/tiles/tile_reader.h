@@ -49,7 +49,7 @@ class TileReader final : public RasterReader {
   std::vector<Held<Data>>& held();
 
   template <class Data>
-  Result<Data> decode(const std::string& bytes) const;
+  Result<Data> decode(const std::string& bytes, const TileAddress& address) const;
   template <class Data>
   Result<Frozen<Data>> tile(const TileAddress& address);
   template <class Data>

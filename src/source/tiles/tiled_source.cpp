@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "raster/height_codes.h"
+#include "source/tiles/height_decoders.h"
 #include "source/tiles/url_tiles.h"
 
 namespace tellurion::source {
@@ -20,8 +22,8 @@ Result<std::unique_ptr<RasterSource>> open_tiles(const TileService& service, con
   if (!address) return naming(address.error());
   pyramid.grid = std::move(*grid);
   pyramid.kind = service.kind;
-  pyramid.decode_heights = picture_heights(service.code);
-  if (service.kind == SampleKind::height && !service.code) pyramid.sample_type = "Float32";
+  pyramid.decode_heights = height_decoder(service.encoding, pyramid.grid);
+  if (service.kind == SampleKind::height && !raster::height_code(service.encoding)) pyramid.sample_type = "Float32";
   pyramid.bounds = service.bounds;
   pyramid.vertical = service.vertical;
   pyramid.supply = url_tiles(std::move(*address), service.headers, pyramid.name, pyramid.grid, std::move(store));

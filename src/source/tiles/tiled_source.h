@@ -26,7 +26,7 @@ struct TileService {
   std::vector<std::string> headers;    ///< "Name: value"
   TileScheme scheme = TileScheme::web_mercator;
   SampleKind kind = SampleKind::colour;
-  std::optional<raster::HeightCode> code;  ///< of heights in pictures; nothing: heights are the first band's numbers
+  std::string encoding;                ///< of heights: see height_decoder; empty: they are the first band's numbers
   int tile_size = 256;                 ///< pixels on a side
   int min_zoom = 0;
   int max_zoom = 18;

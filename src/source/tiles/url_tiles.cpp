@@ -9,12 +9,14 @@ namespace {
 
 class UrlTiles final : public TileSupply {
  public:
-  UrlTiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix, const TileGrid& grid, std::shared_ptr<fetch::ByteStore> store)
-      : address_(std::move(address)), headers_(std::move(headers)), key_prefix_(std::move(key_prefix)), store_(std::move(store)) {
+  UrlTiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix, const TileGrid& grid, std::shared_ptr<fetch::ByteStore> store,
+           std::function<bool(const TileAddress&)> may_have)
+      : address_(std::move(address)), headers_(std::move(headers)), key_prefix_(std::move(key_prefix)), store_(std::move(store)), may_have_(std::move(may_have)) {
     for (const TileLevel& level : grid.levels) rows_.push_back(level.rows);
   }
 
   fetch::Asked ask(const TileAddress& tile, const TileWish& wish) const override {
+    if (may_have_ && !may_have_(tile)) return fetch::File{};
     return store_->ask({url_of(tile), headers_, key_of(tile), {}, wish.expected_bytes}, wish.gain);
   }
   void reject(const TileAddress& tile, const std::string& why) const override { store_->reject(key_of(tile), why); }
@@ -29,13 +31,14 @@ class UrlTiles final : public TileSupply {
   std::string key_prefix_;
   std::vector<std::int64_t> rows_;  ///< by zoom
   std::shared_ptr<fetch::ByteStore> store_;
+  std::function<bool(const TileAddress&)> may_have_;  ///< none: all may exist
 };
 
 }  // namespace
 
-std::shared_ptr<const TileSupply> url_tiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix,
-                                            const TileGrid& grid, std::shared_ptr<fetch::ByteStore> store) {
-  return std::make_shared<UrlTiles>(std::move(address), std::move(headers), std::move(key_prefix), grid, std::move(store));
+std::shared_ptr<const TileSupply> url_tiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix, const TileGrid& grid,
+                                            std::shared_ptr<fetch::ByteStore> store, std::function<bool(const TileAddress&)> may_have) {
+  return std::make_shared<UrlTiles>(std::move(address), std::move(headers), std::move(key_prefix), grid, std::move(store), std::move(may_have));
 }
 
 }  // namespace tellurion::source

@@ -1,6 +1,7 @@
 // Tiles by URL templates, through a store of bytes.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,7 +14,8 @@
 namespace tellurion::source {
 
 /// `key_prefix` names the tiles in caches: without credentials. `headers`: "Name: value", sent with every request.
-std::shared_ptr<const TileSupply> url_tiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix,
-                                            const TileGrid& grid, std::shared_ptr<fetch::ByteStore> store);
+/// `may_have` (if there is one) says which tiles may exist: others are not asked for.
+std::shared_ptr<const TileSupply> url_tiles(TileTemplate address, std::vector<std::string> headers, std::string key_prefix, const TileGrid& grid,
+                                            std::shared_ptr<fetch::ByteStore> store, std::function<bool(const TileAddress&)> may_have = {});
 
 }  // namespace tellurion::source
