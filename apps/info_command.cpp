@@ -25,6 +25,7 @@ void print_raster(const source::RasterDescription& raster) {
   fmt::print("  longitudes  {} .. {}{}\n", angle(raster.bounds.west), angle(raster.bounds.east),
              raster.wraps ? " (all round)" : "");
   fmt::print("  spacing     {:.3f} m\n", raster.spacing.value);
+  if (!raster.attribution.empty()) fmt::print("  credit      {}\n", raster.attribution);
   if (raster.kind == source::SampleKind::height)
     fmt::print("  heights     above {}{}\n", raster.vertical, raster.vertical_declared ? "" : " (not declared: taken as such)");
 }
@@ -44,7 +45,7 @@ int info(const Options& options) {
   for (const globe::LayerInfo& layer : (*globe)->layers()) {
     fmt::print("layer {} ({}){}\n", layer.spec.name, name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
     if (layer.raster) print_raster(layer.raster->description());
-    else fmt::print("  file        {}\n", layer.spec.source.path.string());
+    else fmt::print("  file        {}\n", layer.spec.source.url.empty() ? layer.spec.source.path.string() : fetch::without_credentials(layer.spec.source.url));
     if (!layer.error.empty()) fmt::print("  error       {}\n", layer.error);
   }
   for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);

@@ -22,6 +22,7 @@ build_packages=(
   libglfw3-dev libimgui-dev libstb-dev                         # the window
   libcli11-dev libfmt-dev libglm-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libcurl4-openssl-dev libsqlite3-dev zlib1g-dev               # tiles from servers, and the disk cache
+  libpugixml-dev                                               # what services say of themselves
   gdal-bin libgdal-dev libproj-dev proj-bin proj-data
   ffmpeg                                                       # writes the video of a flight
 )
@@ -29,6 +30,7 @@ test_packages=(
   doctest-dev libgeographiclib-dev
   python3 python3-gdal python3-numpy
   imagemagick x11-apps xauth xdotool xvfb
+  mapproxy nginx-light                                         # services and a server to ask
 )
 fuzz_packages=(clang libclang-rt-14-dev)
 

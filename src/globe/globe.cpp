@@ -18,6 +18,7 @@
 #include "fetch/byte_store.h"
 #include "source/gdal/gdal_source.h"
 #include "source/tiles/cesium_terrain.h"
+#include "source/tiles/service_source.h"
 #include "source/tiles/tiled_source.h"
 
 namespace tellurion::globe {
@@ -82,6 +83,29 @@ source::TileService tile_service(const LayerSpec& layer) {
   return service;
 }
 
+source::ServiceOptions service_options(const LayerSpec& layer) {
+  const SourceSpec& source = layer.source;
+  source::ServiceOptions options;
+  options.url = source.url;
+  for (const auto& [name, value] : source.headers) options.headers.push_back(name + ": " + value);
+  options.kind = kind_of(layer.group);
+  options.code = raster::height_code(source.encoding);
+  options.layer = source.service.layer;
+  options.style = source.service.style;
+  options.matrix_set = source.service.matrix_set;
+  options.format = source.service.format;
+  options.dimensions = source.service.dimensions;
+  options.version = source.service.version;
+  options.crs = source.crs.value_or("");
+  options.transparent = source.service.transparent;
+  options.tile_size = source.tile_size;
+  options.least_level = source.service.min_level;
+  options.most_level = source.service.max_level;
+  options.bounds = source.bounds;
+  options.vertical = source.vertical;
+  return options;
+}
+
 std::filesystem::path default_cache_folder() {
   if (const char* set = std::getenv("XDG_CACHE_HOME"); set && *set) return std::filesystem::path(set) / "tellurion";
   if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache" / "tellurion";
@@ -110,25 +134,34 @@ struct Globe::State {
   std::unique_ptr<HeightTables> tables;
   std::unique_ptr<WorkerPool> pool;  ///< last: its threads end before what they use
 
+  std::shared_ptr<fetch::ByteStore> needed_store();
   Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
   void open_layers();
 };
 
-Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const LayerSpec& spec) {
-  const bool is_terrain = spec.source.type == "cesium-terrain";
-  if (is_terrain && spec.group != LayerGroup::height)
-    return Error{ErrorCode::invalid_argument, fmt::format("{}: holds heights: its layer's group is \"height\"", fetch::public_part(spec.source.url))};
-  if (spec.source.type == "xyz" || is_terrain) {
-    if (!store) {
-      fetch::StoreOptions how;
-      if (!options.cache_folder.empty()) how.disk_file = kept_database(options.cache_folder);
-      how.disk_bytes = options.disk_cache_bytes;
-      how.offline = options.offline;
-      store = std::make_shared<fetch::ByteStore>(how);
-    }
-    if (is_terrain) return source::open_cesium_terrain(cesium_terrain(spec), world.ellipsoid, store);
-    return source::open_tiles(tile_service(spec), world.ellipsoid, store);
+/// The store of bytes, made for the first layer that needs it.
+std::shared_ptr<fetch::ByteStore> Globe::State::needed_store() {
+  if (!store) {
+    fetch::StoreOptions how;
+    if (!options.cache_folder.empty()) how.disk_file = kept_database(options.cache_folder);
+    how.disk_bytes = options.disk_cache_bytes;
+    how.offline = options.offline;
+    store = std::make_shared<fetch::ByteStore>(how);
   }
+  return store;
+}
+
+Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const LayerSpec& spec) {
+  const std::string& type = spec.source.type;
+  if (type == "xyz") return source::open_tiles(tile_service(spec), world.ellipsoid, needed_store());
+  if (type == "cesium-terrain") {
+    if (spec.group != LayerGroup::height)
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: holds heights: its layer's group is \"height\"", fetch::public_part(spec.source.url))};
+    return source::open_cesium_terrain(cesium_terrain(spec), world.ellipsoid, needed_store());
+  }
+  if (type == "wmts") return source::open_wmts(service_options(spec), world.ellipsoid, needed_store());
+  if (type == "wms") return source::open_wms(service_options(spec), world.ellipsoid, needed_store());
+  if (type == "tms") return source::open_tms(service_options(spec), world.ellipsoid, needed_store());
   source::GdalOptions how = gdal_options(spec);
   if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
   return source::open_gdal(how, world.ellipsoid);

@@ -21,6 +21,8 @@ namespace {
 
 constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
 
+bool is_service(const std::string& type) { return type == "wmts" || type == "wms" || type == "tms"; }
+
 bool is_web_address(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
 /// Reads the tables of one world file; the first mistake is kept, what follows it is ignored.
@@ -106,9 +108,10 @@ class WorldReader {
     source.type = text(table, "type").value_or("gdal");
     if (source.type == "xyz") return read_tiles(table, source);
     if (source.type == "cesium-terrain") return read_terrain(table, source);
+    if (is_service(source.type)) return read_service(table, source);
     if (source.type != "gdal") {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("this build reads sources of type \"gdal\", \"xyz\" and \"cesium-terrain\" only, not \"{}\"", source.type), ErrorCode::unsupported);
+                  fmt::format("this build reads sources of type \"gdal\", \"xyz\", \"cesium-terrain\", \"wmts\", \"wms\" and \"tms\" only, not \"{}\"", source.type), ErrorCode::unsupported);
     }
     expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
     if (const auto path = text(table, "path"); path && !path->empty()) {
@@ -144,12 +147,29 @@ class WorldReader {
     source.projection = text(table, "projection").value_or("web-mercator");
     if (source.projection != "web-mercator" && source.projection != "geographic")
       fail(*table.get("projection"), "`projection` is \"web-mercator\" or \"geographic\"");
-    source.encoding = text(table, "encoding").value_or("");
-    if (!source.encoding.empty() && !source::is_height_encoding(source.encoding))
-      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
+    read_encoding(table, source);
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
     source.min_level = static_cast<int>(number(table, "min_level", 0, 30).value_or(0));
     source.max_level = static_cast<int>(number(table, "max_level", 0, 30).value_or(18));
+    read_bounds(table, source);
+    if (const toml::node* list = table.get("subdomains")) {
+      const toml::array* names = list->as_array();
+      if (!names) return fail(*list, "`subdomains` is a list of texts: [\"a\", \"b\"]");
+      for (const toml::node& name : *names) {
+        if (const auto value = name.value_exact<std::string>()) source.subdomains.push_back(*value);
+        else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
+      }
+    }
+    read_headers(table, source);
+  }
+
+  void read_encoding(const toml::table& table, SourceSpec& source) {
+    source.encoding = text(table, "encoding").value_or("");
+    if (!source.encoding.empty() && !source::is_height_encoding(source.encoding))
+      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
+  }
+
+  void read_bounds(const toml::table& table, SourceSpec& source) {
     if (const toml::node* bounds = table.get("bounds")) {
       std::array<double, 4> edges{};
       const toml::array* list = bounds->as_array();
@@ -162,15 +182,6 @@ class WorldReader {
       if (good && edges[0] < edges[2] && edges[1] < edges[3]) source.bounds = edges;
       else fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
     }
-    if (const toml::node* list = table.get("subdomains")) {
-      const toml::array* names = list->as_array();
-      if (!names) return fail(*list, "`subdomains` is a list of texts: [\"a\", \"b\"]");
-      for (const toml::node& name : *names) {
-        if (const auto value = name.value_exact<std::string>()) source.subdomains.push_back(*value);
-        else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
-      }
-    }
-    read_headers(table, source);
   }
 
   void read_terrain(const toml::table& table, SourceSpec& source) {
@@ -184,15 +195,57 @@ class WorldReader {
   }
 
   void read_headers(const toml::table& table, SourceSpec& source) {
-    const toml::node* headers = table.get("headers");
-    if (!headers) return;
-    const toml::table* fields = headers->as_table();
-    if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
-    for (const auto& [name, value] : *fields) {
-      const auto content = value.value_exact<std::string>();
-      const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
-      if (good) source.headers.emplace(name.str(), *content);
-      else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
+    if (const toml::node* headers = table.get("headers")) {
+      const toml::table* fields = headers->as_table();
+      if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
+      for (const auto& [name, value] : *fields) {
+        const auto content = value.value_exact<std::string>();
+        const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
+        if (good) source.headers.emplace(name.str(), *content);
+        else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
+      }
+    }
+  }
+
+  void read_service(const toml::table& table, SourceSpec& source) {
+    ServiceSpec& service = source.service;
+    if (source.type == "wmts") {
+      expect_keys(table, "source", {"type", "url", "headers", "layer", "style", "matrix_set", "format", "dimensions", "encoding", "min_level", "max_level", "bounds", "vertical"});
+    } else if (source.type == "wms") {
+      expect_keys(table, "source", {"type", "url", "headers", "layers", "styles", "version", "crs", "format", "transparent", "dimensions", "tile_size", "encoding",
+                                    "min_level", "max_level", "bounds", "vertical"});
+    } else {
+      expect_keys(table, "source", {"type", "url", "headers", "encoding", "min_level", "max_level", "bounds", "vertical"});
+    }
+    source.url = text(table, "url").value_or("");
+    if (!is_web_address(source.url)) fail(table, "the source needs a `url` of http:// or https://: that of the service or of its capabilities");
+    const bool wms = source.type == "wms";
+    service.layer = text(table, wms ? "layers" : "layer").value_or("");
+    service.style = text(table, wms ? "styles" : "style").value_or("");
+    service.matrix_set = text(table, "matrix_set").value_or("");
+    service.format = text(table, "format").value_or("");
+    service.version = text(table, "version").value_or("");
+    if (!service.version.empty() && service.version != "1.1.1" && service.version != "1.3.0") fail(*table.get("version"), "`version` is \"1.1.1\" or \"1.3.0\"");
+    service.transparent = flag(table, "transparent");
+    const auto level = [&](const char* key) -> std::optional<int> {
+      const auto value = number(table, key, 0, 30);
+      return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
+    };
+    service.min_level = level("min_level");
+    service.max_level = level("max_level");
+    source.crs = text(table, "crs");
+    source.vertical = text(table, "vertical");
+    source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
+    read_encoding(table, source);
+    read_bounds(table, source);
+    read_headers(table, source);
+    if (const toml::node* dimensions = table.get("dimensions")) {
+      const toml::table* values = dimensions->as_table();
+      if (!values) return fail(*dimensions, "`dimensions` is a table: dimensions = { Time = \"2012-01-01\" }");
+      for (const auto& [name, value] : *values) {
+        if (const auto content = value.value_exact<std::string>()) service.dimensions.emplace(name.str(), *content);
+        else fail(value, fmt::format("the dimension `{}` must be text in quotes", name.str()));
+      }
     }
   }
 
@@ -241,10 +294,52 @@ class WorldReader {
   std::optional<Error> error_;
 };
 
+toml::array edges_array(const std::array<double, 4>& edges) {
+  toml::array list;
+  for (const double edge : edges) list.push_back(edge);
+  return list;
+}
+
+toml::table texts_table(const std::map<std::string, std::string>& texts) {
+  toml::table table;
+  table.is_inline(true);
+  for (const auto& [name, value] : texts) table.insert(name, value);
+  return table;
+}
+
+/// What source_table has still to say of a WMTS, WMS or TMS.
+void add_service(const SourceSpec& source, toml::table& table) {
+  const ServiceSpec& service = source.service;
+  const bool wms = source.type == "wms";
+  const auto add = [&](const char* key, const std::string& value) {
+    if (!value.empty()) table.insert(key, value);
+  };
+  table.insert("url", source.url);
+  if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
+  add(wms ? "layers" : "layer", service.layer);
+  add(wms ? "styles" : "style", service.style);
+  add("matrix_set", service.matrix_set);
+  add("format", service.format);
+  add("version", service.version);
+  add("crs", source.crs.value_or(""));
+  add("encoding", source.encoding);
+  if (!service.dimensions.empty()) table.insert("dimensions", texts_table(service.dimensions));
+  if (service.transparent) table.insert("transparent", *service.transparent);
+  if (service.min_level) table.insert("min_level", *service.min_level);
+  if (service.max_level) table.insert("max_level", *service.max_level);
+  if (source.tile_size != SourceSpec{}.tile_size) table.insert("tile_size", source.tile_size);
+  if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
+  if (source.vertical) table.insert("vertical", *source.vertical);
+}
+
 toml::table source_table(const SourceSpec& source, const std::filesystem::path& folder) {
   toml::table table;
   table.is_inline(true);
   table.insert("type", source.type);
+  if (is_service(source.type)) {
+    add_service(source, table);
+    return table;
+  }
   if (source.type == "xyz" || source.type == "cesium-terrain") {
     SourceSpec usual;
     if (source.type == "cesium-terrain") {
@@ -257,22 +352,13 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
       for (const std::string& name : source.subdomains) names.push_back(name);
       table.insert("subdomains", std::move(names));
     }
-    if (!source.headers.empty()) {
-      toml::table fields;
-      fields.is_inline(true);
-      for (const auto& [name, value] : source.headers) fields.insert(name, value);
-      table.insert("headers", std::move(fields));
-    }
+    if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
     if (source.projection != usual.projection) table.insert("projection", source.projection);
     if (!source.encoding.empty()) table.insert("encoding", source.encoding);
     if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
     if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
     if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
-    if (source.bounds) {
-      toml::array edges;
-      for (const double edge : *source.bounds) edges.push_back(edge);
-      table.insert("bounds", std::move(edges));
-    }
+    if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
     if (source.vertical) table.insert("vertical", *source.vertical);
     return table;
   }

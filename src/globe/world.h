@@ -23,6 +23,18 @@ std::string_view name_of(LayerGroup group);
 
 inline constexpr int kEveryLevel = 30;   ///< as SourceSpec::max_level of "cesium-terrain": all that the server says it has
 inline constexpr int kTerrainSize = 128; ///< the usual SourceSpec::tile_size of "cesium-terrain"
+/// What is asked of a WMTS, WMS or TMS: see source::ServiceOptions.
+struct ServiceSpec {
+  std::string layer;       ///< of WMS `layers`, with commas between them
+  std::string style;       ///< likewise
+  std::string matrix_set;
+  std::string format;
+  std::string version;
+  std::map<std::string, std::string> dimensions;
+  std::optional<bool> transparent;
+  std::optional<int> min_level;
+  std::optional<int> max_level;
+};
 
 /// Where a layer's data come from. `path` is absolute once a world is loaded.
 struct SourceSpec {
@@ -45,6 +57,8 @@ struct SourceSpec {
   int min_level = 0;
   int max_level = 18;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees
+
+  ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like
 };
 
 struct LayerSpec {

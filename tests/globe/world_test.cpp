@@ -160,6 +160,54 @@ TEST_CASE("parse_world: tiles of heights may be meshes or heightmaps") {
   }
 }
 
+TEST_CASE("parse_world: services, each with its own keys") {
+  const auto source = [](const std::string& keys) { return message_of("[[layer]]\ngroup = \"color\"\nsource = { " + keys + " }\n"); };
+  CHECK(contains(source("type = \"wmts\", url = \"http://h\", layers = \"a\""), "w.toml:3: source has no key `layers`"));
+  CHECK(contains(source("type = \"wms\", url = \"http://h\", layer = \"a\""), "no key `layer`"));
+  CHECK(contains(source("type = \"tms\", url = \"http://h\", style = \"a\""), "no key `style`"));
+  CHECK(contains(source("type = \"wms\", url = \"http://h\", version = \"2.0\""), "1.3.0"));
+  CHECK(contains(source("type = \"wmts\", url = \"h\""), "`url`"));
+  CHECK(contains(source("type = \"wmts\", url = \"http://h\", dimensions = { Time = 3 }"), "`Time`"));
+  CHECK(contains(source("type = \"wmts\", url = \"http://h\", dimensions = \"now\""), "dimensions"));
+}
+
+TEST_CASE("to_toml: services come back with all that was said of them") {
+  const auto world = parse_world(
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"wmts\", url = \"https://host/caps.xml\", layer = \"a b\", style = \"s\", matrix_set = \"m\", "
+      "format = \"image/png\", dimensions = { Time = \"2020\" }, headers = { Cookie = \"c\" }, max_level = 7 }\n"
+      "[[layer]]\ngroup = \"height\"\nsource = { type = \"wms\", url = \"https://host/wms\", layers = \"a,b\", styles = \",x\", version = \"1.1.1\", crs = \"EPSG:3035\", "
+      "transparent = false, tile_size = 512, encoding = \"terrarium\", min_level = 2, bounds = [0, 40, 20.5, 60], vertical = \"egm96\" }\n"
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"tms\", url = \"https://host/tms/\" }\n", "/worlds", "w.toml");
+  REQUIRE(world);
+  const auto again = parse_world(to_toml(*world), "/worlds", "again.toml");
+  REQUIRE(again);
+  for (const World* w : {&*world, &*again}) {
+    const SourceSpec& wmts = w->layers[0].source;
+    CHECK(wmts.type == "wmts");
+    CHECK(wmts.service.layer == "a b");
+    CHECK(wmts.service.style == "s");
+    CHECK(wmts.service.matrix_set == "m");
+    CHECK(wmts.service.format == "image/png");
+    CHECK(wmts.service.dimensions.at("Time") == "2020");
+    CHECK(wmts.headers.at("Cookie") == "c");
+    CHECK(wmts.service.max_level == 7);
+    CHECK(!wmts.service.min_level);
+    const SourceSpec& wms = w->layers[1].source;
+    CHECK(wms.service.layer == "a,b");
+    CHECK(wms.service.style == ",x");
+    CHECK(wms.service.version == "1.1.1");
+    CHECK(wms.crs == "EPSG:3035");
+    CHECK(wms.service.transparent == false);
+    CHECK(wms.tile_size == 512);
+    CHECK(wms.encoding == "terrarium");
+    CHECK(wms.service.min_level == 2);
+    CHECK(wms.bounds == std::array{0.0, 40.0, 20.5, 60.0});
+    CHECK(wms.vertical == "egm96");
+    CHECK(w->layers[2].source.url == "https://host/tms/");
+    CHECK(w->layers[2].name == "https://host/tms/");
+  }
+}
+
 TEST_CASE("load_world: a file that is not there is named") {
   const auto world = load_world("/no/such/world.toml");
   REQUIRE_FALSE(world);
