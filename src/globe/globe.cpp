@@ -89,7 +89,7 @@ source::ServiceOptions service_options(const LayerSpec& layer) {
   options.url = source.url;
   for (const auto& [name, value] : source.headers) options.headers.push_back(name + ": " + value);
   options.kind = kind_of(layer.group);
-  options.code = raster::height_code(source.encoding);
+  options.encoding = source.encoding;
   options.layer = source.service.layer;
   options.style = source.service.style;
   options.matrix_set = source.service.matrix_set;

@@ -26,9 +26,14 @@ layers:
     title: City lights
     sources: [night]
 caches:
+  whole:  # MapProxy reprojects from caches only
+    grids: [tiles]
+    sources: [tiles]
+    disable_storage: true
+    format: image/png
   night:
     grids: [mercator, geodetic, arctic]
-    sources: [tiles]
+    sources: [whole]
     disable_storage: true
     format: image/png
 sources:

@@ -11,7 +11,6 @@
 #include "base/result.h"
 #include "fetch/byte_store.h"
 #include "geo/ellipsoid.h"
-#include "raster/height_codes.h"
 #include "source/raster_source.h"
 
 namespace tellurion::source {
@@ -21,7 +20,7 @@ struct ServiceOptions {
   std::string url;                   ///< of the capabilities or the service; of a TMS: of its tilemapresource.xml
   std::vector<std::string> headers;  ///< "Name: value"
   SampleKind kind = SampleKind::colour;
-  std::optional<raster::HeightCode> code;  ///< of heights in pictures; nothing: heights are the first band's numbers
+  std::string encoding;              ///< of heights: see height_decoder
   std::string layer;                 ///< WMTS; WMS: one or several, with commas between them, the first the lowest
   std::string style;                 ///< empty: the default one; WMS: as many as layers, with commas between them
   std::string matrix_set;            ///< WMTS; empty: the first of Web Mercator, longitude and latitude, others

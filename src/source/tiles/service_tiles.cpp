@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "source/tiles/bounded_xml.h"
+#include "source/tiles/height_decoders.h"
 #include "source/tiles/service_url.h"
 
 namespace tellurion::source {
@@ -106,7 +107,7 @@ Result<std::string> choose_format(const ServiceOptions& options, const std::vect
     if (found.empty()) return Error{ErrorCode::invalid_argument, fmt::format("has no format \"{}\"; it has {}", options.format, listed(formats))};
     return found;
   }
-  if (options.kind == SampleKind::height && !options.code) {
+  if (options.kind == SampleKind::height && options.encoding.empty()) {
     std::string numbers = find([](const std::string& f) { return f.find("tiff") != std::string::npos; });
     if (numbers.empty()) return Error{ErrorCode::unsupported, fmt::format("offers no TIFF, which heights need unless `encoding` says how they are in a picture; it has {}", listed(formats))};
     return numbers;
@@ -134,8 +135,8 @@ Result<std::unique_ptr<RasterSource>> open_service(TilePyramid pyramid, const Se
                                                    const std::optional<std::array<double, 4>>& declared, const geo::Ellipsoid& world) {
   if (const Result<void> kept = keep_levels(pyramid.grid, options); !kept) return naming(pyramid.name, kept.error());
   pyramid.kind = options.kind;
-  pyramid.decode_heights = picture_heights(options.code);
-  pyramid.sample_type = options.kind == SampleKind::height && !options.code ? "Float32" : "Byte";
+  pyramid.decode_heights = height_decoder(options.encoding, pyramid.grid);
+  pyramid.sample_type = options.kind == SampleKind::height && options.encoding.empty() ? "Float32" : "Byte";
   pyramid.vertical = options.vertical;
   pyramid.is_remote = true;
   pyramid.bounds = options.bounds ? options.bounds : sensible(declared);
