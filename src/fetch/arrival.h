@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -36,6 +37,12 @@ class Arrival {
   void wait(const std::stop_token& stop) const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, stop, [&] { return over_; });
+  }
+
+  /// Waits until it is over, or for `patience`; whether it is over.
+  bool wait_for(std::chrono::milliseconds patience) const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, patience, [&] { return over_; });
   }
 
   /// Calls `told` once: when it is over, on any thread, or at once.

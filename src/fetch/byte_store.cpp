@@ -28,6 +28,11 @@ struct Entry {
   int failures = 0;  ///< in a row
 };
 
+File file_of(DiskEntry entry) {
+  if (entry.missing) return {};
+  return {std::make_shared<const std::string>(std::move(entry.body)), std::move(entry.content_type), std::move(entry.etag), entry.whole_bytes};
+}
+
 }  // namespace
 
 struct ByteStore::State : std::enable_shared_from_this<State> {
@@ -139,11 +144,11 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
     std::optional<DiskEntry> old = disk ? disk->find(request.key) : std::nullopt;
     if (!old || old->missing) return Error{ErrorCode::unavailable, fmt::format("{}: was dropped from the cache just now", public_part(request.url))};
     disk->renew(request.key, expires);
-    return File{std::make_shared<const std::string>(std::move(old->body)), old->content_type};
+    return file_of(std::move(*old));
   }
-  DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires};
+  DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires, outcome->whole_bytes};
   if (disk) disk->put(request.key, entry);
-  return File{std::make_shared<const std::string>(std::move(entry.body)), std::move(entry.content_type)};
+  return file_of(std::move(entry));
 }
 
 void ByteStore::State::arrived(const Request& request, std::uint64_t number, Outcome outcome) {
@@ -192,10 +197,10 @@ Asked ByteStore::ask(const Request& request, double gain) {
     if (std::optional<DiskEntry> entry = s.disk->find(request.key)) {
       const bool fresh = s.options.offline || System::now() < entry->expires;
       if (fresh) {
-        File file;
-        if (!entry->missing) file = {std::make_shared<const std::string>(std::move(entry->body)), entry->content_type};
+        const bool missing = entry->missing;
+        File file = file_of(std::move(*entry));
         std::lock_guard lock(s.mutex);
-        s.keep(request.key, file, entry->missing ? Steady::duration(s.options.negative_lifetime) : Steady::duration(s.options.default_lifetime));
+        s.keep(request.key, file, missing ? Steady::duration(s.options.negative_lifetime) : Steady::duration(s.options.default_lifetime));
         return file;
       }
       if (!entry->missing) wanted.etag = entry->etag;

@@ -33,6 +33,8 @@ struct StoreOptions {
 struct File {
   std::shared_ptr<const std::string> bytes;  ///< null: the server says that there is no such file
   std::string content_type;
+  std::string etag{};                        ///< the version, if the server names it
+  std::uint64_t whole_bytes = 0;             ///< of the whole file, where a part was asked for
 };
 
 /// A file; or why it cannot be had for now; or that it is on its way. Who lets go of an arrival does not want it any more:

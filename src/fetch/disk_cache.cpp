@@ -15,7 +15,7 @@
 namespace tellurion::fetch {
 namespace {
 
-constexpr int kVersion = 1;             ///< of the tables
+constexpr int kVersion = 2;             ///< of the tables
 constexpr int kBusyWait_ms = 2000;      ///< for another process
 constexpr double kRoomAfterwards = 0.9; ///< share of the budget that is left filled when room is made
 
@@ -102,9 +102,16 @@ struct DiskCache::State {
 
   bool execute(const char* text) { return sqlite3_exec(database.get(), text, nullptr, nullptr, nullptr) == SQLITE_OK; }
   bool open();
+  std::int64_t version();
   void make_room();
   void recount();
 };
+
+/// Of the tables: 0 if there are none yet, -1 if it cannot be read.
+std::int64_t DiskCache::State::version() {
+  Statement version(database.get(), "PRAGMA user_version");
+  return version && version.run() == SQLITE_ROW ? version.number(0) : -1;
+}
 
 bool DiskCache::State::open() {
   sqlite3* opened = nullptr;
@@ -115,19 +122,22 @@ bool DiskCache::State::open() {
   sqlite3_extended_result_codes(database.get(), 1);
   const std::string make = fmt::format(
       "CREATE TABLE IF NOT EXISTS files (key TEXT PRIMARY KEY, body BLOB NOT NULL, missing INTEGER NOT NULL, etag TEXT NOT NULL,"
-      " type TEXT NOT NULL, expires INTEGER NOT NULL, used INTEGER NOT NULL, bytes INTEGER NOT NULL, checksum INTEGER NOT NULL);"
+      " type TEXT NOT NULL, expires INTEGER NOT NULL, used INTEGER NOT NULL, bytes INTEGER NOT NULL, checksum INTEGER NOT NULL,"
+      " whole INTEGER NOT NULL DEFAULT 0);"
       "CREATE INDEX IF NOT EXISTS files_used ON files (used, bytes);"
       "PRAGMA user_version = {};", kVersion);
   if (!execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA auto_vacuum = INCREMENTAL;")) return false;
-  Statement version(database.get(), "PRAGMA user_version");
-  if (!version || version.run() != SQLITE_ROW) return false;
-  const std::int64_t found = version.number(0);
-  version.finish();
+  std::int64_t found = version();
+  if (found == 1) {
+    const bool altered = execute("BEGIN IMMEDIATE; ALTER TABLE files ADD COLUMN whole INTEGER NOT NULL DEFAULT 0; PRAGMA user_version = 2; COMMIT");
+    if (!altered) execute("ROLLBACK");
+    found = version();  // another process may have been faster
+  }
   if (found != 0 && found != kVersion) return false;
   if (found == 0 && !execute(make.c_str())) return false;
-  find = Statement(database.get(), "SELECT body, missing, etag, type, expires, checksum, used FROM files WHERE key = ?");
-  put = Statement(database.get(), "INSERT OR REPLACE INTO files (key, body, missing, etag, type, expires, used, bytes, checksum)"
-                                  " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  find = Statement(database.get(), "SELECT body, missing, etag, type, expires, checksum, used, whole FROM files WHERE key = ?");
+  put = Statement(database.get(), "INSERT OR REPLACE INTO files (key, body, missing, etag, type, expires, used, bytes, checksum, whole)"
+                                  " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   drop = Statement(database.get(), "DELETE FROM files WHERE key = ?");
   use = Statement(database.get(), "UPDATE files SET used = ? WHERE key = ?");
   renew = Statement(database.get(), "UPDATE files SET expires = ? WHERE key = ?");
@@ -200,7 +210,7 @@ std::optional<DiskEntry> DiskCache::find(std::string_view key) {
     return std::nullopt;
   }
   DiskEntry entry{s.find.text(0), s.find.number(1) != 0, s.find.text(2), s.find.text(3),
-                  std::chrono::system_clock::time_point(std::chrono::seconds(s.find.number(4)))};
+                  std::chrono::system_clock::time_point(std::chrono::seconds(s.find.number(4))), static_cast<std::uint64_t>(s.find.number(7))};
   const std::int64_t checksum = s.find.number(5), used = s.find.number(6);
   s.find.finish();
   if (checksum != checksum_of(key, entry.body)) {
@@ -221,7 +231,7 @@ void DiskCache::put(std::string_view key, const DiskEntry& entry) {
   std::lock_guard lock(s.mutex);
   const auto size = static_cast<std::int64_t>(entry.body.size() + key.size());
   const int status = s.put.run(key, Statement::blob(entry.body), std::int64_t{entry.missing}, std::string_view(entry.etag),
-                               std::string_view(entry.content_type), seconds_of(entry.expires), now_ms(), size, checksum_of(key, entry.body));
+                               std::string_view(entry.content_type), seconds_of(entry.expires), now_ms(), size, checksum_of(key, entry.body), static_cast<std::int64_t>(entry.whole_bytes));
   s.put.finish();
   if (status != SQLITE_DONE) {
     if (!std::exchange(s.full, true)) log::warning(fmt::format("{}: {}; what is fetched is not kept", s.file.string(), sqlite3_errstr(status)));

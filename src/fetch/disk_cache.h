@@ -21,6 +21,7 @@ struct DiskEntry {
   std::string etag;
   std::string content_type;
   std::chrono::system_clock::time_point expires;
+  std::uint64_t whole_bytes = 0; ///< of the file of which `body` is a part; 0: it is none
 };
 
 class DiskCache {

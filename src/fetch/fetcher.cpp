@@ -49,6 +49,8 @@ struct Transfer {
   std::optional<std::chrono::seconds> retry_after;
   std::size_t most_bytes = 0;
   bool too_large = false;
+  bool not_in_parts = false;       ///< the server sends the whole file instead of the range
+  std::string content_range;
 };
 
 std::string lower(std::string_view text) {
@@ -81,7 +83,15 @@ std::optional<std::chrono::seconds> retry_after_of(const std::string& value) {
 
 std::size_t take_body(char* data, std::size_t, std::size_t count, void* user) {
   Transfer& transfer = *static_cast<Transfer*>(user);
-  if (transfer.reply.body.size() + count > transfer.most_bytes) {
+  long status = 0;
+  curl_easy_getinfo(transfer.easy.get(), CURLINFO_RESPONSE_CODE, &status);
+  const bool whole = transfer.request.range && status == 200;  // fine if it is no more than the part that was asked for
+  const bool too_much = transfer.reply.body.size() + count > transfer.most_bytes;
+  if (whole && (too_much || transfer.request.range->offset > 0)) {
+    transfer.not_in_parts = true;
+    return 0;
+  }
+  if (too_much) {
     transfer.too_large = true;
     return 0;
   }
@@ -95,6 +105,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   if (line.starts_with("HTTP/")) {  // of a redirect's target: what was said before does not count
     transfer.reply = {};
     transfer.retry_after.reset();
+    transfer.content_range.clear();
   }
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) return count;
@@ -102,6 +113,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   const std::string value(trimmed(line.substr(colon + 1)));
   if (name == "etag") transfer.reply.etag = value;
   if (name == "content-type") transfer.reply.content_type = lower(value);
+  if (name == "content-range") transfer.content_range = lower(value);
   if (name == "retry-after") transfer.retry_after = retry_after_of(value);
   if (name == "cache-control") {
     const std::string directives = lower(value);
@@ -109,6 +121,31 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
     if (directives.find("no-store") != std::string::npos || directives.find("no-cache") != std::string::npos) transfer.reply.max_age = std::chrono::seconds(0);
   }
   return count;
+}
+
+/// Whether what came is the part that was asked for; finds the size of the whole file. `Content-Range: bytes 0-99/1234`
+/// (RFC 9110, 14.4); a short file may come whole.
+bool is_asked_part(Transfer& transfer, long status) {
+  const ByteRange& asked = *transfer.request.range;
+  Reply& reply = transfer.reply;
+  if (status == 200) {
+    reply.whole_bytes = reply.body.size();
+    return true;
+  }
+  std::uint64_t first = 0, last = 0, whole = 0;
+  const std::string& text = transfer.content_range;
+  const char* const end = text.data() + text.size();
+  const auto read = [end](const char* at, std::uint64_t& number, char after) {
+    const auto [stop, failure] = std::from_chars(at, end, number);
+    return failure == std::errc() && (after == 0 ? stop == end : stop != end && *stop == after) ? stop + 1 : nullptr;
+  };
+  if (!text.starts_with("bytes ")) return false;
+  const char* at = read(text.data() + 6, first, '-');
+  if (at) at = read(at, last, '/');
+  if (!at || !read(at, whole, 0)) return false;
+  reply.whole_bytes = whole;
+  return first == asked.offset && last >= first && last < whole && reply.body.size() == last - first + 1 &&
+         reply.body.size() == std::min(asked.length, whole - first);
 }
 
 /// Whether another attempt may go better.
@@ -122,6 +159,10 @@ bool is_passing(CURLcode code, long status) {
 
 Error failure_of(const Transfer& transfer, CURLcode code, long status, const FetchOptions& options) {
   const std::string url = public_part(transfer.request.url);
+  if (transfer.not_in_parts || (code == CURLE_OK && status == 206)) {
+    return {ErrorCode::unsupported, fmt::format("{}: the server does not give the parts of a file that are asked for (HTTP ranges); download the file and "
+                                                "give its path", url)};
+  }
   if (transfer.too_large) return {ErrorCode::exhausted, fmt::format("{}: the reply is larger than {} MB", url, options.most_bytes >> 20)};
   if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL)
     return {ErrorCode::invalid_argument, fmt::format("{}: no URL of http or https", url)};
@@ -222,7 +263,8 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   t.easy.reset(curl_easy_init());
   t.reply = {};
   t.retry_after.reset();
-  t.too_large = false;
+  t.content_range.clear();
+  t.too_large = t.not_in_parts = false;
   t.most_bytes = options.most_bytes;
   ++t.attempts;
   CURL* easy = t.easy.get();
@@ -231,7 +273,13 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   curl_easy_setopt(easy, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 1L);
   curl_easy_setopt(easy, CURLOPT_MAXREDIRS, static_cast<long>(kMostRedirects));
-  curl_easy_setopt(easy, CURLOPT_ACCEPT_ENCODING, "");  // all that curl can undo
+  if (t.request.range) {  // of the bytes as they are: nothing may compress them on the way
+    const ByteRange& range = *t.request.range;
+    t.most_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(t.most_bytes, range.length));
+    curl_easy_setopt(easy, CURLOPT_RANGE, fmt::format("{}-{}", range.offset, range.offset + range.length - 1).c_str());
+  } else {
+    curl_easy_setopt(easy, CURLOPT_ACCEPT_ENCODING, "");  // all that curl can undo
+  }
   curl_easy_setopt(easy, CURLOPT_USERAGENT, "tellurion/" TELLURION_VERSION);
   curl_easy_setopt(easy, CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_2TLS));
   curl_easy_setopt(easy, CURLOPT_PIPEWAIT, 0L);
@@ -273,7 +321,7 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   curl_off_t received = 0;
   curl_easy_getinfo(easy, CURLINFO_SIZE_DOWNLOAD_T, &received);
   transfer->easy.reset();
-  bool again = is_passing(code, status) && !transfer->too_large && transfer->attempts < options.most_attempts;
+  bool again = is_passing(code, status) && !transfer->too_large && !transfer->not_in_parts && transfer->attempts < options.most_attempts;
   auto pause = std::chrono::duration_cast<std::chrono::milliseconds>(
       options.first_pause * (1 << (transfer->attempts - 1)) * std::uniform_real_distribution<>(0.5, 1.5)(random));
   if (transfer->retry_after) {
@@ -292,7 +340,8 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
     }
   }
   transfer->reply.not_modified = status == 304;
-  if (code == CURLE_OK && (status == 200 || status == 304)) {
+  const bool sent = transfer->request.range ? (status == 200 || status == 206) && is_asked_part(*transfer, status) : status == 200;
+  if (code == CURLE_OK && (sent || status == 304)) {
     Outcome outcome = std::move(transfer->reply);
     finish(std::move(transfer), std::move(outcome));
   } else {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,13 +13,22 @@
 
 namespace tellurion::fetch {
 
-/// A file on a server.
+/// Bytes offset ... offset + length - 1 of a file.
+struct ByteRange {
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;
+
+  friend bool operator==(const ByteRange&, const ByteRange&) = default;
+};
+
+/// A file on a server, or a part of one.
 struct Request {
   std::string url;                   ///< http: or https:; may hold credentials
   std::vector<std::string> headers;  ///< "Name: value"; may hold credentials
   std::string key{};                 ///< names the bytes in caches; holds no credentials
   std::string etag{};                ///< of bytes that are there already: only others are sent
   double expected_bytes = 0;         ///< see Arrival
+  std::optional<ByteRange> range{};  ///< this part only, or what there is of it before the file's end
 };
 
 /// The end of a transfer that the server answered.
@@ -28,10 +38,11 @@ struct Reply {
   std::string etag;
   std::optional<std::chrono::seconds> max_age;  ///< for how long the server says that it holds
   bool not_modified = false;                    ///< the bytes are still those of Request::etag; no body
+  std::uint64_t whole_bytes = 0;                ///< of the whole file, where a part was asked for
 };
 
 /// Errors: not_found (204, 404, 410: there is no such file), unsupported (401, 403 and other refusals: asking again cannot
-/// help), unavailable (no connection, time-out, 429, 5xx: after all retries), exhausted (too large), cancelled.
+/// help; a server that does not give parts), unavailable (no connection, time-out, 429, 5xx: after all retries), exhausted (too large), cancelled.
 /// Messages name the URL without its query, and what to do.
 using Outcome = Result<Reply>;
 using Done = std::function<void(Outcome)>;

@@ -180,6 +180,46 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
   CHECK(fetcher.stats().cancelled == 2);
 }
 
+TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
+  const std::string file = "0123456789abcdef";
+  std::string headers;
+  const LittleServer server([&](const Ask& ask) {
+    headers = ask.headers;
+    if (ask.path == "/whole") return Say{.body = file};
+    if (ask.path == "/other") return Say{.status = 206, .body = "2345", .headers = {"Content-Range: bytes 2-5/16"}};
+    if (ask.path == "/short") return Say{.status = 206, .body = "345", .headers = {"Content-Range: bytes 3-5/16"}};
+    if (ask.path == "/silent") return Say{.status = 206, .body = "3456"};
+    if (ask.path == "/odd") return Say{.status = 206, .body = "3456", .headers = {"Content-Range: bytes 3-6/*"}};
+    return test::part_of(file, ask, "\"v1\"");
+  });
+  const auto part = [&](const std::string& path, ByteRange range) {
+    Outcomes outcomes;
+    Fetcher fetcher(hasty());
+    fetcher.start({server.url(path), {}, path, {}, range}, 0, outcomes.taker(path));
+    return outcomes.wait(1).front().second;
+  };
+  const Outcome middle = part("/file", {3, 4});
+  REQUIRE(middle);
+  CHECK(middle->body == "3456");
+  CHECK(middle->whole_bytes == 16);
+  CHECK(middle->etag == "\"v1\"");
+  CHECK(headers.find("Range: bytes=3-6\r\n") != std::string::npos);
+  CHECK_MESSAGE(headers.find("Accept-Encoding") == std::string::npos, "the bytes of the file, not of a compressed one");
+  CHECK(part("/file", {12, 100}).value().body == "cdef");
+  CHECK(part("/whole", {0, 16}).value().body == file);
+  CHECK(part("/whole", {0, 16}).value().whole_bytes == 16);
+  for (const char* path : {"/whole", "/other", "/short", "/silent", "/odd"}) {
+    CAPTURE(path);
+    const Outcome wrong = part(path, {3, 4});
+    REQUIRE_FALSE(wrong);
+    CHECK(wrong.error().code == ErrorCode::unsupported);
+    CHECK(wrong.error().message.find("ranges") != std::string::npos);
+    CHECK(server.asked(path) <= 3);
+  }
+  CHECK_FALSE(part("/whole", {0, 8}));
+  CHECK_FALSE(part("/file", {16, 4}));
+}
+
 TEST_CASE("without_credentials: what names the file stays, what opens the door goes") {
   CHECK(without_credentials("https://a.b/c/1.png?layer=x&apikey=1&Token=2&v=3") == "https://a.b/c/1.png?layer=x&v=3");
   CHECK(without_credentials("http://u:p@a.b/c") == "http://a.b/c");

@@ -1,6 +1,7 @@
 // A web server of a few lines, on loopback, for tests: answers what a function says.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -33,6 +34,21 @@ struct Say {
   bool hangs_up = false;                 ///< closes without a word
   std::chrono::milliseconds after{0};
 };
+
+/// Answers as a server that gives parts of `file`, if a part is asked for.
+inline Say part_of(const std::string& file, const Ask& ask, const std::string& etag = {}) {
+  Say say{.body = file};
+  if (!etag.empty()) say.headers.push_back("ETag: " + etag);
+  const std::size_t at = ask.headers.find("\r\nRange: bytes=");
+  if (at == std::string::npos) return say;
+  const std::string range = ask.headers.substr(at + 15, ask.headers.find("\r\n", at + 2) - at - 15);
+  const std::size_t first = std::stoull(range), last = std::min<std::size_t>(std::stoull(range.substr(range.find('-') + 1)), file.size() - 1);
+  if (first >= file.size()) return Say{.status = 416, .headers = {fmt::format("Content-Range: bytes */{}", file.size())}};
+  say.status = 206;
+  say.body = file.substr(first, last - first + 1);
+  say.headers.push_back(fmt::format("Content-Range: bytes {}-{}/{}", first, last, file.size()));
+  return say;
+}
 
 class LittleServer {
  public:

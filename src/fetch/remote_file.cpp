@@ -1,0 +1,88 @@
+#include "fetch/remote_file.h"
+
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
+
+namespace tellurion::fetch {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// What is asked for, waited for.
+Result<File> wait_until_there(ByteStore& store, const Request& request, std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  for (;;) {
+    Asked asked = store.ask(request);
+    if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
+    if (auto* file = std::get_if<File>(&asked)) {
+      if (!file->bytes) return Error{ErrorCode::not_found, fmt::format("{}: there is no such file", public_part(request.url))};
+      return std::move(*file);
+    }
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0 || !std::get<std::shared_ptr<Arrival>>(asked)->wait_for(left))
+      return Error{ErrorCode::unavailable, fmt::format("{}: no answer within {} s; is the server there, and the network?", public_part(request.url), patience.count() / 1000)};
+  }
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const RemoteFile>> RemoteFile::open(std::shared_ptr<ByteStore> store, const std::string& url, std::vector<std::string> headers,
+                                                           std::size_t head_bytes, std::chrono::milliseconds patience) {
+  std::shared_ptr<RemoteFile> made(new RemoteFile);
+  made->store_ = std::move(store);
+  made->url_ = url;
+  made->headers_ = std::move(headers);
+  made->name_ = without_credentials(url);
+  made->head_key_ = fmt::format("{}#0+{}", made->name_, head_bytes);
+  const Request request{url, made->headers_, made->head_key_, {}, ByteRange{0, head_bytes}};
+  Result<File> file = wait_until_there(*made->store_, request, patience);
+  if (!file) return file.error();
+  made->head_ = file->bytes;
+  made->etag_ = file->etag;
+  made->size_ = file->whole_bytes;
+  if (made->size_ < made->head_->size()) {  // kept by something else under this name
+    made->store_->reject(made->head_key_, made->name_);
+    return Error{ErrorCode::unavailable, fmt::format("{}: its first bytes were no part of a file; try again", made->name_)};
+  }
+  return std::shared_ptr<const RemoteFile>(std::move(made));
+}
+
+std::string RemoteFile::revision() const { return fmt::format("{}|{}|{}", name_, etag_, size_); }
+
+Request RemoteFile::request_for(const ByteRange& part) const {
+  return {url_, headers_, fmt::format("{}#{}+{}@{}", name_, part.offset, part.length, etag_), {}, part};
+}
+
+Asked RemoteFile::ask(const ByteRange& part, double gain) const {
+  if (part.offset > size_ || part.length > size_ - part.offset || part.length == 0)
+    return Error{ErrorCode::corrupt, fmt::format("{}: its index names bytes {} to {}, but it has {}; it is cut off or damaged", name_, part.offset,
+                                                 part.offset + part.length, size_)};
+  if (part.offset + part.length <= head_->size())
+    return File{std::make_shared<const std::string>(head_->substr(static_cast<std::size_t>(part.offset), static_cast<std::size_t>(part.length))), {}, etag_, size_};
+  const Request request = request_for(part);
+  Asked asked = store_->ask(request, gain);
+  const File* file = std::get_if<File>(&asked);
+  if (!file || (file->bytes && file->etag == etag_ && file->whole_bytes == size_)) return asked;
+  const std::string why = fmt::format("{}: has changed on the server since it was opened; open it again", name_);
+  store_->reject(request.key, why);
+  store_->reject(head_key_, why);
+  return Error{ErrorCode::unavailable, why};
+}
+
+Result<std::shared_ptr<const std::string>> RemoteFile::wait_for(const ByteRange& part, std::chrono::milliseconds patience) const {
+  const auto deadline = Clock::now() + patience;
+  for (;;) {
+    Asked asked = ask(part, 0);
+    if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
+    if (auto* file = std::get_if<File>(&asked)) return std::move(file->bytes);
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0 || !std::get<std::shared_ptr<Arrival>>(asked)->wait_for(left))
+      return Error{ErrorCode::unavailable, fmt::format("{}: no answer within {} s; is the server there, and the network?", name_, patience.count() / 1000)};
+  }
+}
+
+void RemoteFile::reject(const ByteRange& part, const std::string& why) const { store_->reject(request_for(part).key, why); }
+
+}  // namespace tellurion::fetch
