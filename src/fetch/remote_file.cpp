@@ -83,6 +83,10 @@ Result<std::shared_ptr<const std::string>> RemoteFile::wait_for(const ByteRange&
   }
 }
 
-void RemoteFile::reject(const ByteRange& part, const std::string& why) const { store_->reject(request_for(part).key, why); }
+void RemoteFile::reject(const ByteRange& part, const std::string& why) const {
+  const bool in_head = part.offset < head_->size();
+  store_->reject(in_head ? head_key_ : request_for(part).key, why);
+  if (in_head && part.offset + part.length > head_->size()) store_->reject(request_for(part).key, why);
+}
 
 }  // namespace tellurion::fetch

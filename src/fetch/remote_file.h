@@ -30,7 +30,7 @@ class RemoteFile {
   Asked ask(const ByteRange& part, double gain) const;
   /// The same, waited for.
   Result<std::shared_ptr<const std::string>> wait_for(const ByteRange& part, std::chrono::milliseconds patience) const;
-  /// The bytes proved worthless: they are forgotten.
+  /// The bytes proved worthless: they are forgotten, with the head if they belong to it.
   void reject(const ByteRange& part, const std::string& why) const;
 
  private:

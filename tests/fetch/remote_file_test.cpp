@@ -100,6 +100,28 @@ TEST_CASE("RemoteFile: parts of two versions are never mixed, and opening it aga
   CHECK((*again)->revision() != (*file)->revision());
 }
 
+TEST_CASE("RemoteFile: what was rejected is fetched anew") {
+  std::atomic<int> requests{0};
+  const LittleServer server([&](const Ask& ask) {
+    ++requests;
+    return test::part_of(kFile, ask, "\"1\"");
+  });
+  const Folder folder;
+  const auto open = [&] { return RemoteFile::open(store_in(folder.file()), server.url("/a"), {}, 8, 5s); };
+  const auto file = open();
+  REQUIRE(file);
+  CHECK(text_of((*file)->wait_for({22, 4}, 5s)) == "then");
+  CHECK(requests == 2);
+  (*file)->reject({22, 4}, "is worthless");
+  CHECK(text_of((*file)->wait_for({22, 4}, 5s)) == "is worthless");
+  std::this_thread::sleep_for(30ms);
+  CHECK(text_of((*file)->wait_for({22, 4}, 5s)) == "then");
+  CHECK(requests == 3);
+  (*file)->reject({2, 3}, "is worthless");
+  CHECK(open());
+  CHECK(requests == 4);
+}
+
 TEST_CASE("RemoteFile: what is not there, does not answer or gives no parts is said") {
   const LittleServer server([](const Ask& ask) {
     if (ask.path == "/whole") return Say{.body = std::string(100, 'x')};

@@ -229,7 +229,7 @@ std::string revision_of(GDALDataset& dataset, const GdalOptions& options) {
   char** files = dataset.GetFileList();
   for (int i = 0; i < CSLCount(files); ++i) {
     VSIStatBufL stat;
-    if (VSIStatL(files[i], &stat) == 0) text += fmt::format("|{} {} {}", files[i], stat.st_size, static_cast<long long>(stat.st_mtime));
+    if (VSIStatL(files[i], &stat) == 0 && !std::string_view(files[i]).starts_with(kRemotePrefix)) text += fmt::format("|{} {} {}", files[i], stat.st_size, static_cast<long long>(stat.st_mtime));
   }
   CSLDestroy(files);
   const auto add = [&](const char* name, const auto& option) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "base/result.h"
 #include "geo/ellipsoid.h"
 #include "source/gdal/gdal_source.h"
+#include "source/gdal/remote_mount.h"
 #include "source/proj/pixel_mapping.h"
 #include "source/raster_source.h"
 
@@ -47,6 +49,7 @@ struct ColourPlan {
 struct GdalLayout {
   GdalOptions options;
   std::string file;      ///< what readers open: the raster itself, or its unpacked copy
+  std::shared_ptr<const RemoteChunks> remote;  ///< that instead, if it lies on a server
   geo::Ellipsoid world;
   RasterDescription description;
   Georeference georeference;

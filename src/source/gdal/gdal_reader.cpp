@@ -17,17 +17,10 @@ std::size_t area(const PixelWindow& window) { return static_cast<std::size_t>(wi
 
 }  // namespace
 
-GdalReader::GdalReader(std::shared_ptr<const GdalLayout> layout, GDALDatasetUniquePtr dataset, PixelMapping mapping, std::optional<VerticalDatum> datum)
-    : layout_(std::move(layout)), dataset_(std::move(dataset)), mapping_(std::move(mapping)), datum_(std::move(datum)) {}
+GdalReader::GdalReader(std::shared_ptr<const GdalLayout> layout, PixelMapping mapping, std::optional<VerticalDatum> datum)
+    : layout_(std::move(layout)), mapping_(std::move(mapping)), datum_(std::move(datum)) {}
 
 Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalLayout> layout) {
-  Result<GDALDatasetUniquePtr> dataset = open_dataset(layout->file);
-  if (!dataset) return dataset.error();
-  const LevelSize& full = layout->description.levels.front();
-  if (dataset.value()->GetRasterXSize() != full.width || dataset.value()->GetRasterYSize() != full.height ||
-      dataset.value()->GetRasterCount() != layout->description.band_count) {
-    return Error{ErrorCode::unavailable, fmt::format("{}: has changed since it was opened; open it again", layout->options.path)};
-  }
   Result<PixelMapping> mapping = PixelMapping::create(layout->georeference, layout->world);
   if (!mapping) return mapping.error();
   std::optional<VerticalDatum> datum;
@@ -36,8 +29,46 @@ Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalL
     if (!made) return made.error();
     datum = std::move(made).value();
   }
-  return std::unique_ptr<GdalReader>(new GdalReader(std::move(layout), std::move(dataset).value(), std::move(mapping).value(), std::move(datum)));
+  std::unique_ptr<GdalReader> reader(new GdalReader(std::move(layout), std::move(mapping).value(), std::move(datum)));
+  if (Result<void> opened = reader->open_again(); !opened) return opened.error();
+  return reader;
 }
+
+Result<void> GdalReader::open_again() {
+  if (layout_->remote) {
+    Result<RemoteDataset> opened = open_remote_tiff(layout_->remote);
+    if (!opened) return opened.error();
+    dataset_ = std::move(opened->dataset);
+    mount_ = std::move(opened->mount);
+    blocks_ = std::make_unique<RemoteBlocks>(*mount_);
+  } else {
+    Result<GDALDatasetUniquePtr> opened = open_dataset(layout_->file);
+    if (!opened) return opened.error();
+    dataset_ = std::move(opened).value();
+  }
+  const LevelSize& full = layout_->description.levels.front();
+  if (dataset_->GetRasterXSize() == full.width && dataset_->GetRasterYSize() == full.height &&
+      dataset_->GetRasterCount() == layout_->description.band_count)
+    return {};
+  return {ErrorCode::unavailable, fmt::format("{}: has changed since it was opened; open it again", layout_->options.path)};
+}
+
+/// Before a read of a remote file.
+Result<void> GdalReader::begin() { return dataset_ ? Result<void>() : open_again(); }
+
+/// After a read of a remote file, which ended with `error` or none.
+void GdalReader::end(const Error* error) {
+  if (!blocks_) return;
+  for (auto& arrival : blocks_->take_awaited()) awaited_.push_back(std::move(arrival));
+  if (error && error->code == ErrorCode::corrupt) blocks_->reject(error->message);
+  blocks_->release();
+  if (!mount_->failure()) return;
+  blocks_.reset();
+  dataset_.reset();
+  mount_.reset();
+}
+
+Awaited GdalReader::take_awaited() { return std::exchange(awaited_, {}); }
 
 GDALRasterBand& GdalReader::band(int number, int overview) const {
   GDALRasterBand* full = dataset_->GetRasterBand(number);
@@ -46,10 +77,14 @@ GDALRasterBand& GdalReader::band(int number, int overview) const {
 }
 
 Result<void> GdalReader::read_samples(GDALRasterBand& from, const PixelWindow& window, std::vector<double>& samples) const {
+  if (blocks_) {
+    if (Result<void> brought = blocks_->bring(from, window); !brought) return brought;
+  }
   const QuietErrors quiet;
   samples.resize(area(window));
   const CPLErr status = from.RasterIO(GF_Read, window.x, window.y, window.width, window.height, samples.data(), window.width, window.height,
                                       GDT_Float64, 0, 0, nullptr);
+  if (mount_ && mount_->failure()) return *mount_->failure();
   if (status == CE_None) return {};
   return {ErrorCode::corrupt, fmt::format("{}: cannot read columns {} to {} of rows {} to {}: {}", layout_->options.path, window.x,
                                           window.x + window.width - 1, window.y, window.y + window.height - 1, quiet.last())};
@@ -61,12 +96,14 @@ Result<raster::HeightGrid> GdalReader::heights_of_overview(int overview, const P
   const HeightPlan& plan = layout_->heights;
   GDALRasterBand& from = band(1, overview);
   std::vector<double> samples;
-  if (Result<void> read = read_samples(from, window, samples); !read) return read.error();
+  Result<void> read = read_samples(from, window, samples);
+  if (!read && read.error().code != ErrorCode::pending) return read.error();
   std::vector<double> mask;
   const int flags = from.GetMaskFlags();
   if ((flags & (GMF_ALL_VALID | GMF_NODATA)) == 0) {
-    if (Result<void> read = read_samples(*from.GetMaskBand(), window, mask); !read) return read.error();
+    if (Result<void> mask_read = read_samples(*from.GetMaskBand(), window, mask); !mask_read) return mask_read.error();
   }
+  if (!read) return read.error();
   const bool is_float = from.GetRasterDataType() == GDT_Float32;
   const double no_data = plan.no_data ? (is_float ? static_cast<double>(static_cast<float>(*plan.no_data)) : *plan.no_data)
                                       : std::numeric_limits<double>::quiet_NaN();
@@ -95,12 +132,16 @@ Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Re
   const int bottom = std::min(static_cast<int>(std::ceil((window.y + window.height) * step_y)), fine.GetYSize());
   constexpr int kStripSamples = 1 << 20;
   const int strip_rows = std::max(1, kStripSamples / (right - left));
+  bool pending = false;
   for (int row = top; row < bottom; row += strip_rows) {
     const PixelWindow strip{left, row, right - left, std::min(strip_rows, bottom - row)};
     Result<Data> samples = read(overview, strip);
-    if (!samples) return samples.error();
+    if (!samples && samples.error().code == ErrorCode::pending) pending = true;  // the others are asked for too
+    else if (!samples) return samples.error();
+    if (pending) continue;
     average.add(samples.value(), left, row);
   }
+  if (pending) return Error{ErrorCode::pending, layout_->options.path};
   if constexpr (std::is_same_v<Data, raster::HeightGrid>) {
     return average.heights();
   } else {
@@ -110,9 +151,11 @@ Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Re
 
 Result<raster::HeightGrid> GdalReader::read_heights(int level, const PixelWindow& window) {
   const QuietErrors quiet;
+  if (Result<void> begun = begin(); !begun) return begun.error();
   const LevelPlan& plan = layout_->levels[static_cast<std::size_t>(level)];
   const auto read = [this](int overview, const PixelWindow& part) { return heights_of_overview(overview, part); };
   Result<raster::HeightGrid> grid = plan.direct ? read(plan.overview, window) : averaged<raster::HeightGrid>(level, window, read);
+  end(grid ? nullptr : &grid.error());
   if (grid && datum_) raise_to_ellipsoid(grid.value(), layout_->description, level, window, mapping_, *datum_);
   return grid;
 }
@@ -124,19 +167,27 @@ Result<raster::Image> GdalReader::colours_of_overview(int overview, const PixelW
   const std::size_t count = area(window);
   raster::Image image{window.width, window.height, std::vector<std::uint8_t>(count * 4)};
   std::vector<std::vector<double>> samples(plan.bands.size());
+  bool pending = false;  // bands that lie apart are asked for together
+  const auto read_all = [&](GDALRasterBand& from, std::vector<double>& into) {
+    Result<void> read = read_samples(from, window, into);
+    if (read || read.error().code != ErrorCode::pending) return read;
+    pending = true;
+    return Result<void>();
+  };
   for (std::size_t b = 0; b < plan.bands.size(); ++b) {
-    if (Result<void> read = read_samples(band(plan.bands[b], overview), window, samples[b]); !read) return read.error();
+    if (Result<void> read = read_all(band(plan.bands[b], overview), samples[b]); !read) return read.error();
   }
   std::vector<double> alpha;
   double full_alpha = 255.0;
   GDALRasterBand& first = band(plan.bands.front(), overview);
   if (plan.alpha_band) {
     GDALRasterBand& from = band(plan.alpha_band, overview);
-    if (Result<void> read = read_samples(from, window, alpha); !read) return read.error();
+    if (Result<void> read = read_all(from, alpha); !read) return read.error();
     if (from.GetRasterDataType() == GDT_UInt16) full_alpha = 65535.0;
   } else if ((first.GetMaskFlags() & (GMF_ALL_VALID | GMF_NODATA)) == 0) {
-    if (Result<void> read = read_samples(*first.GetMaskBand(), window, alpha); !read) return read.error();
+    if (Result<void> read = read_all(*first.GetMaskBand(), alpha); !read) return read.error();
   }
+  if (pending) return Error{ErrorCode::pending, layout_->options.path};
 
   const bool has_no_data = std::all_of(plan.no_data.begin(), plan.no_data.end(), [](const auto& value) { return value.has_value(); });
   for (std::size_t i = 0; i < count; ++i) {
@@ -174,6 +225,7 @@ Result<raster::Image> GdalReader::colours_of_overview(int overview, const PixelW
 Result<void> GdalReader::find_ranges() {
   const ColourPlan& plan = layout_->colours;
   std::vector<Range> ranges;
+  bool pending = false;
   for (std::size_t b = 0; b < plan.bands.size(); ++b) {
     if (plan.full_scale) {
       ranges.push_back({0.0, *plan.full_scale});
@@ -188,7 +240,11 @@ Result<void> GdalReader::find_ranges() {
       const int height = std::max(1, std::min(16, from.GetYSize() / kWindows));
       const auto place = [](int i, int size, int part) { return static_cast<int>((static_cast<long long>(size) - part) * i / (kWindows - 1)); };
       const PixelWindow window{place(w % kWindows, from.GetXSize(), width), place(w / kWindows, from.GetYSize(), height), width, height};
-      if (Result<void> read = read_samples(from, window, samples); !read) return read;
+      if (Result<void> read = read_samples(from, window, samples); !read) {
+        if (read.error().code != ErrorCode::pending) return read;
+        pending = true;
+        continue;
+      }
       for (const double sample : samples) {
         if (std::isfinite(sample) && !(plan.no_data[b] && sample == *plan.no_data[b])) all.push_back(sample);
       }
@@ -205,18 +261,25 @@ Result<void> GdalReader::find_ranges() {
     }
     ranges.push_back(range);
   }
+  if (pending) return {ErrorCode::pending, layout_->options.path};
   ranges_ = std::move(ranges);
   return {};
 }
 
 Result<raster::Image> GdalReader::read_colours(int level, const PixelWindow& window) {
   const QuietErrors quiet;
+  if (Result<void> begun = begin(); !begun) return begun.error();
   if (ranges_.empty()) {
-    if (Result<void> found = find_ranges(); !found) return found.error();
+    if (Result<void> found = find_ranges(); !found) {
+      end(&found.error());
+      return found.error();
+    }
   }
   const LevelPlan& plan = layout_->levels[static_cast<std::size_t>(level)];
   const auto read = [this](int overview, const PixelWindow& part) { return colours_of_overview(overview, part); };
-  return plan.direct ? read(plan.overview, window) : averaged<raster::Image>(level, window, read);
+  Result<raster::Image> image = plan.direct ? read(plan.overview, window) : averaged<raster::Image>(level, window, read);
+  end(image ? nullptr : &image.error());
+  return image;
 }
 
 }  // namespace tellurion::source

@@ -7,6 +7,8 @@
 
 #include "source/gdal/gdal_layout.h"
 #include "source/gdal/gdal_runtime.h"
+#include "source/gdal/remote_blocks.h"
+#include "source/gdal/remote_mount.h"
 #include "source/proj/vertical_datum.h"
 
 namespace tellurion::source {
@@ -20,6 +22,7 @@ class GdalReader final : public RasterReader {
   Result<raster::Image> read_colours(int level, const PixelWindow& window) override;
   void to_pixels(std::span<const geo::LatLon> places, std::span<glm::dvec2> pixels) override { mapping_.to_pixels(places, pixels); }
   void to_places(std::span<const glm::dvec2> pixels, std::span<geo::LatLon> places) override { mapping_.to_places(pixels, places); }
+  Awaited take_awaited() override;
 
  private:
   struct Range {
@@ -27,7 +30,11 @@ class GdalReader final : public RasterReader {
     double high = 255.0;
   };
 
-  GdalReader(std::shared_ptr<const GdalLayout> layout, GDALDatasetUniquePtr dataset, PixelMapping mapping, std::optional<VerticalDatum> datum);
+  GdalReader(std::shared_ptr<const GdalLayout> layout, PixelMapping mapping, std::optional<VerticalDatum> datum);
+
+  Result<void> open_again();
+  Result<void> begin();
+  void end(const Error* error);
 
   GDALRasterBand& band(int number, int overview) const;
   Result<void> read_samples(GDALRasterBand& from, const PixelWindow& window, std::vector<double>& samples) const;
@@ -38,7 +45,10 @@ class GdalReader final : public RasterReader {
   Result<Data> averaged(int level, const PixelWindow& window, const Read& read) const;
 
   std::shared_ptr<const GdalLayout> layout_;
-  GDALDatasetUniquePtr dataset_;
+  std::unique_ptr<RemoteMount> mount_;  ///< of a remote file; outlives the data set
+  GDALDatasetUniquePtr dataset_;        ///< none: a part of it could not be read, it has to be opened again
+  std::unique_ptr<RemoteBlocks> blocks_;  ///< of a remote file
+  Awaited awaited_;
   PixelMapping mapping_;
   std::optional<VerticalDatum> datum_;
   std::vector<Range> ranges_;  ///< of the colour bands: what is black and white; empty until needed

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "fetch/remote_file.h"
 #include "source/gdal/gdal_layout.h"
 #include "source/gdal/gdal_reader.h"
 #include "source/gdal/gdal_runtime.h"
+#include "source/gdal/remote_mount.h"
 #include "source/grid_coverage.h"
 #include "source/proj/vertical_datum.h"
 
@@ -85,13 +88,13 @@ PixelRange reach_of(const GdalLayout& layout, PixelMapping& mapping) {
 
 }  // namespace
 
-Result<std::unique_ptr<RasterSource>> open_gdal(const GdalOptions& options, const geo::Ellipsoid& world) {
-  Result<GDALDatasetUniquePtr> dataset = open_dataset(options.path);
-  if (!dataset) return dataset.error();
-  Result<GdalLayout> inspected = inspect(*dataset.value(), options, world);
-  if (!inspected) return inspected.error();
-  auto layout = std::make_shared<GdalLayout>(std::move(inspected).value());
+namespace {
 
+/// A source over what `inspect` has found.
+Result<std::unique_ptr<RasterSource>> make_source(GdalLayout inspected) {
+  auto layout = std::make_shared<GdalLayout>(std::move(inspected));
+  const GdalOptions& options = layout->options;
+  const geo::Ellipsoid& world = layout->world;
   Result<PixelMapping> mapping = PixelMapping::create(layout->georeference, world);
   if (!mapping) return naming(options, mapping.error());
   if (Result<void> chosen = choose_vertical(*layout, mapping->facts()); !chosen) return naming(options, chosen.error());
@@ -107,6 +110,52 @@ Result<std::unique_ptr<RasterSource>> open_gdal(const GdalOptions& options, cons
   about.spacing = spacing_at(0.5 * size, world, to_places);
   GridCoverage coverage(reach, world, to_places);
   return std::unique_ptr<RasterSource>(std::make_unique<GdalSource>(std::move(layout), std::move(coverage)));
+}
+
+/// What a remote raster needs beyond a local one: none of its levels may be made of a large part of the file.
+Result<void> suit_for_network(const GdalLayout& layout) {
+  constexpr double kMostAveraged = 1 << 23;  // samples
+  for (std::size_t level = 0; level < layout.levels.size(); ++level) {
+    if (layout.levels[level].direct) continue;
+    std::size_t base = level - 1;
+    while (!layout.levels[base].direct) --base;
+    const LevelSize& size = layout.description.levels[base];
+    if (static_cast<double>(size.width) * size.height <= kMostAveraged) continue;
+    return {ErrorCode::unsupported, fmt::format("{}: lacks overviews, so that a view from afar would have to fetch all of it; gdal_translate -of COG makes a "
+                                                "file with them", layout.options.path)};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RasterSource>> open_gdal(const GdalOptions& options, const geo::Ellipsoid& world) {
+  Result<GDALDatasetUniquePtr> dataset = open_dataset(options.path);
+  if (!dataset) return dataset.error();
+  Result<GdalLayout> layout = inspect(*dataset.value(), options, world);
+  if (!layout) return layout.error();
+  return make_source(std::move(*layout));
+}
+
+Result<std::unique_ptr<RasterSource>> open_cog(const GdalOptions& options, const std::vector<std::string>& headers, const geo::Ellipsoid& world,
+                                               std::shared_ptr<fetch::ByteStore> store) {
+  constexpr std::chrono::milliseconds kPatience{30'000};
+  auto file = fetch::RemoteFile::open(std::move(store), options.path, headers, RemoteChunks::kChunkBytes, kPatience);
+  if (!file) return file.error();
+  const auto chunks = std::make_shared<const RemoteChunks>(std::move(*file));
+  Result<RemoteDataset> opened = open_remote_tiff(chunks);
+  if (!opened) return opened.error();
+  GdalOptions named = options;
+  named.path = chunks->file().name();
+  named.unpack_folder.clear();
+  Result<GdalLayout> layout = inspect(*opened->dataset, named, world);
+  if (!layout) return layout.error();
+  layout->remote = chunks;
+  layout->description.is_remote = true;
+  layout->revision = fmt::format("{}|{}", chunks->file().revision(), layout->revision);
+  if (opened->mount->failure()) return *opened->mount->failure();
+  if (Result<void> suited = suit_for_network(*layout); !suited) return suited.error();
+  return make_source(std::move(*layout));
 }
 
 }  // namespace tellurion::source

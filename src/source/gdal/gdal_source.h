@@ -7,8 +7,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
+#include "fetch/byte_store.h"
 #include "source/raster_source.h"
 
 namespace tellurion::source {
@@ -35,5 +37,11 @@ std::size_t gdal_cache_bytes();
 /// Errors, each naming the file and what to do: not_found; unsupported (no raster, no georeference, not a supported layout);
 /// corrupt; invalid_argument (its CRS is of another body; unknown CRS or datum in `options`).
 Result<std::unique_ptr<RasterSource>> open_gdal(const GdalOptions& options, const geo::Ellipsoid& world);
+
+/// Opens a GeoTIFF at a URL, options.path, of which only the parts that are shown are fetched, each once; that takes a tiled file
+/// with overviews (a COG) on a server of HTTP ranges. Waits for its directories; its readers answer `pending` while samples are on
+/// their way. Errors: as open_gdal's and RemoteFile's; unsupported (large and without overviews).
+Result<std::unique_ptr<RasterSource>> open_cog(const GdalOptions& options, const std::vector<std::string>& headers, const geo::Ellipsoid& world,
+                                               std::shared_ptr<fetch::ByteStore> store);
 
 }  // namespace tellurion::source
