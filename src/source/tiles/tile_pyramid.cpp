@@ -27,7 +27,7 @@ class PyramidSource final : public RasterSource {
 
   const RasterDescription& description() const override { return layout_->description; }
   const Coverage& coverage() const override { return coverage_; }
-  std::string revision() const override { return layout_->pyramid.name; }
+  std::string revision() const override { return layout_->pyramid.revision.empty() ? layout_->pyramid.name : layout_->pyramid.revision; }
   Result<std::unique_ptr<RasterReader>> open_reader() const override {
     Result<PixelMapping> mapping = PixelMapping::create(layout_->georeference, layout_->world);
     if (!mapping) return mapping.error();

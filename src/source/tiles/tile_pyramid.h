@@ -25,6 +25,7 @@ HeightDecoder picture_heights(std::optional<raster::HeightCode> code);
 
 struct TilePyramid {
   std::string name;              ///< as messages and caches' keys name it: without credentials
+  std::string revision{};        ///< names the content, as RasterSource::revision; empty: the name does
   TileGrid grid;
   SampleKind kind = SampleKind::colour;
   HeightDecoder decode_heights;  ///< for SampleKind::height
