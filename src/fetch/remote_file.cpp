@@ -36,7 +36,7 @@ Result<std::shared_ptr<const RemoteFile>> RemoteFile::open(std::shared_ptr<ByteS
   made->headers_ = std::move(headers);
   made->name_ = without_credentials(url);
   made->head_key_ = fmt::format("{}#0+{}", made->name_, head_bytes);
-  const Request request{url, made->headers_, made->head_key_, {}, ByteRange{0, head_bytes}};
+  const Request request{url, made->headers_, made->head_key_, {}, 0, ByteRange{0, head_bytes}};
   Result<File> file = wait_until_there(*made->store_, request, patience);
   if (!file) return file.error();
   made->head_ = file->bytes;
@@ -52,7 +52,7 @@ Result<std::shared_ptr<const RemoteFile>> RemoteFile::open(std::shared_ptr<ByteS
 std::string RemoteFile::revision() const { return fmt::format("{}|{}|{}", name_, etag_, size_); }
 
 Request RemoteFile::request_for(const ByteRange& part) const {
-  return {url_, headers_, fmt::format("{}#{}+{}@{}", name_, part.offset, part.length, etag_), {}, part};
+  return {url_, headers_, fmt::format("{}#{}+{}@{}", name_, part.offset, part.length, etag_), {}, 0, part};
 }
 
 Asked RemoteFile::ask(const ByteRange& part, double gain) const {

@@ -19,6 +19,7 @@
 #include "source/gdal/gdal_source.h"
 #include "source/tiles/cesium_terrain.h"
 #include "source/tiles/service_source.h"
+#include "source/tiles/tile_archive.h"
 #include "source/tiles/tiled_source.h"
 
 namespace tellurion::globe {
@@ -55,15 +56,35 @@ source::GdalOptions gdal_options(const LayerSpec& layer) {
   return options;
 }
 
+std::vector<std::string> header_lines(const SourceSpec& source) {
+  std::vector<std::string> lines;
+  for (const auto& [name, value] : source.headers) lines.push_back(name + ": " + value);
+  return lines;
+}
+
 source::CesiumTerrain cesium_terrain(const LayerSpec& layer) {
   const SourceSpec& source = layer.source;
   source::CesiumTerrain terrain;
   terrain.url = source.url;
-  for (const auto& [name, value] : source.headers) terrain.headers.push_back(name + ": " + value);
+  terrain.headers = header_lines(source);
   terrain.tile_size = source.tile_size;
   if (source.max_level != kEveryLevel) terrain.max_zoom = source.max_level;
   terrain.vertical = source.vertical;
   return terrain;
+}
+
+source::TileArchive tile_archive(const LayerSpec& layer) {
+  const SourceSpec& source = layer.source;
+  source::TileArchive archive;
+  archive.file = source.path;
+  archive.url = source.url;
+  archive.headers = header_lines(source);
+  archive.table = source.table;
+  archive.kind = kind_of(layer.group);
+  archive.encoding = source.encoding;
+  archive.bounds = source.bounds;
+  archive.vertical = source.vertical;
+  return archive;
 }
 
 source::TileService tile_service(const LayerSpec& layer) {
@@ -71,7 +92,7 @@ source::TileService tile_service(const LayerSpec& layer) {
   source::TileService service;
   service.url = source.url;
   service.subdomains = source.subdomains;
-  for (const auto& [name, value] : source.headers) service.headers.push_back(name + ": " + value);
+  service.headers = header_lines(source);
   service.scheme = source.projection == "geographic" ? source::TileScheme::geographic : source::TileScheme::web_mercator;
   service.kind = kind_of(layer.group);
   service.encoding = source.encoding;
@@ -162,7 +183,14 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
   if (type == "wmts") return source::open_wmts(service_options(spec), world.ellipsoid, needed_store());
   if (type == "wms") return source::open_wms(service_options(spec), world.ellipsoid, needed_store());
   if (type == "tms") return source::open_tms(service_options(spec), world.ellipsoid, needed_store());
+  if (type == "mbtiles") return source::open_mbtiles(tile_archive(spec), world.ellipsoid);
+  if (type == "geopackage") return source::open_geopackage(tile_archive(spec), world.ellipsoid);
+  if (type == "pmtiles") return source::open_pmtiles(tile_archive(spec), world.ellipsoid, spec.source.url.empty() ? nullptr : needed_store());
   source::GdalOptions how = gdal_options(spec);
+  if (type == "cog") {
+    how.path = spec.source.url;
+    return source::open_cog(how, header_lines(spec.source), world.ellipsoid, needed_store());
+  }
   if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
   return source::open_gdal(how, world.ellipsoid);
 }

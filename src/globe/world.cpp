@@ -25,6 +25,8 @@ bool is_service(const std::string& type) { return type == "wmts" || type == "wms
 
 bool is_web_address(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
+bool is_archive(const std::string& type) { return type == "mbtiles" || type == "geopackage" || type == "pmtiles"; }
+
 /// Reads the tables of one world file; the first mistake is kept, what follows it is ignored.
 class WorldReader {
  public:
@@ -108,17 +110,25 @@ class WorldReader {
     source.type = text(table, "type").value_or("gdal");
     if (source.type == "xyz") return read_tiles(table, source);
     if (source.type == "cesium-terrain") return read_terrain(table, source);
+    if (source.type == "cog") return read_cog(table, source);
+    if (is_archive(source.type)) return read_archive(table, source);
     if (is_service(source.type)) return read_service(table, source);
     if (source.type != "gdal") {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("this build reads sources of type \"gdal\", \"xyz\", \"cesium-terrain\", \"wmts\", \"wms\" and \"tms\" only, not \"{}\"", source.type), ErrorCode::unsupported);
+                  fmt::format("no source is of type \"{}\": it is gdal, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles or cog", source.type), ErrorCode::unsupported);
     }
     expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
-    if (const auto path = text(table, "path"); path && !path->empty()) {
-      source.path = (folder_ / *path).lexically_normal();
-    } else {
-      fail(table, "the source has no `path`");
-    }
+    read_path(table, source);
+    read_samples(table, source);
+  }
+
+  void read_path(const toml::table& table, SourceSpec& source) {
+    if (const auto path = text(table, "path"); path && !path->empty()) source.path = (folder_ / *path).lexically_normal();
+    else fail(table, "the source has no `path`");
+  }
+
+  /// What is said over what a raster says itself.
+  void read_samples(const toml::table& table, SourceSpec& source) {
     source.crs = text(table, "crs");
     source.vertical = text(table, "vertical");
     constexpr double kAny = std::numeric_limits<double>::infinity();
@@ -139,6 +149,67 @@ class WorldReader {
     }
   }
 
+  void read_cog(const toml::table& table, SourceSpec& source) {
+    expect_keys(table, "source", {"type", "url", "headers", "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    source.url = text(table, "url").value_or("");
+    if (!is_web_address(source.url)) fail(table, "the source needs a `url` of http:// or https://, for example \"https://host/raster.tif\"");
+    read_headers(table, source);
+    read_samples(table, source);
+  }
+
+  void read_archive(const toml::table& table, SourceSpec& source) {
+    if (source.type == "mbtiles") expect_keys(table, "source", {"type", "path", "encoding", "vertical", "bounds"});
+    if (source.type == "geopackage") expect_keys(table, "source", {"type", "path", "table", "encoding", "vertical", "bounds"});
+    if (source.type == "pmtiles") expect_keys(table, "source", {"type", "path", "url", "headers", "encoding", "vertical", "bounds"});
+    if (table.contains("url")) {
+      source.url = text(table, "url").value_or("");
+      if (!is_web_address(source.url)) fail(*table.get("url"), "`url` begins with http:// or https://; a file has a `path`");
+      if (table.contains("path")) fail(table, "the source has a `path` and a `url`: only one of them can be");
+      read_headers(table, source);
+    } else {
+      read_path(table, source);
+    }
+    source.table = text(table, "table").value_or("");
+    source.vertical = text(table, "vertical");
+    read_encoding(table, source);
+    source.bounds = read_bounds(table);
+  }
+
+  void read_encoding(const toml::table& table, SourceSpec& source) {
+    source.encoding = text(table, "encoding").value_or("");
+    if (!source.encoding.empty() && !source::is_height_encoding(source.encoding))
+      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
+  }
+
+  std::optional<std::array<double, 4>> read_bounds(const toml::table& table) {
+    const toml::node* bounds = table.get("bounds");
+    if (!bounds) return std::nullopt;
+    std::array<double, 4> edges{};
+    const toml::array* list = bounds->as_array();
+    bool good = list && list->size() == 4;
+    for (std::size_t i = 0; good && i < 4; ++i) {
+      const auto edge = (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
+      good = edge && std::abs(*edge) <= (i % 2 == 0 ? 180.0 : 90.0);
+      if (good) edges[i] = *edge;
+    }
+    if (good && edges[0] < edges[2] && edges[1] < edges[3]) return edges;
+    fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
+    return std::nullopt;
+  }
+
+  void read_headers(const toml::table& table, SourceSpec& source) {
+    const toml::node* headers = table.get("headers");
+    if (!headers) return;
+    const toml::table* fields = headers->as_table();
+    if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
+    for (const auto& [name, value] : *fields) {
+      const auto content = value.value_exact<std::string>();
+      const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
+      if (good) source.headers.emplace(name.str(), *content);
+      else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
+    }
+  }
+
   void read_tiles(const toml::table& table, SourceSpec& source) {
     expect_keys(table, "source", {"type", "url", "subdomains", "headers", "projection", "encoding", "tile_size", "min_level", "max_level", "bounds", "vertical"});
     source.url = text(table, "url").value_or("");
@@ -151,7 +222,8 @@ class WorldReader {
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
     source.min_level = static_cast<int>(number(table, "min_level", 0, 30).value_or(0));
     source.max_level = static_cast<int>(number(table, "max_level", 0, 30).value_or(18));
-    read_bounds(table, source);
+    source.bounds = read_bounds(table);
+    read_headers(table, source);
     if (const toml::node* list = table.get("subdomains")) {
       const toml::array* names = list->as_array();
       if (!names) return fail(*list, "`subdomains` is a list of texts: [\"a\", \"b\"]");
@@ -159,28 +231,6 @@ class WorldReader {
         if (const auto value = name.value_exact<std::string>()) source.subdomains.push_back(*value);
         else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
       }
-    }
-    read_headers(table, source);
-  }
-
-  void read_encoding(const toml::table& table, SourceSpec& source) {
-    source.encoding = text(table, "encoding").value_or("");
-    if (!source.encoding.empty() && !source::is_height_encoding(source.encoding))
-      fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
-  }
-
-  void read_bounds(const toml::table& table, SourceSpec& source) {
-    if (const toml::node* bounds = table.get("bounds")) {
-      std::array<double, 4> edges{};
-      const toml::array* list = bounds->as_array();
-      bool good = list && list->size() == 4;
-      for (std::size_t i = 0; good && i < 4; ++i) {
-        const auto edge = (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
-        good = edge && std::abs(*edge) <= (i % 2 == 0 ? 180.0 : 90.0);
-        if (good) edges[i] = *edge;
-      }
-      if (good && edges[0] < edges[2] && edges[1] < edges[3]) source.bounds = edges;
-      else fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
     }
   }
 
@@ -192,19 +242,6 @@ class WorldReader {
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(kTerrainSize));
     source.max_level = static_cast<int>(number(table, "max_level", 0, 29).value_or(kEveryLevel));
     read_headers(table, source);
-  }
-
-  void read_headers(const toml::table& table, SourceSpec& source) {
-    if (const toml::node* headers = table.get("headers")) {
-      const toml::table* fields = headers->as_table();
-      if (!fields) return fail(*headers, "`headers` is a table: headers = { Authorization = \"...\" }");
-      for (const auto& [name, value] : *fields) {
-        const auto content = value.value_exact<std::string>();
-        const bool good = content && (std::string(name.str()) + *content).find_first_of("\r\n") == std::string::npos;
-        if (good) source.headers.emplace(name.str(), *content);
-        else fail(value, fmt::format("the header `{}` must be text in quotes, on one line", name.str()));
-      }
-    }
   }
 
   void read_service(const toml::table& table, SourceSpec& source) {
@@ -237,7 +274,7 @@ class WorldReader {
     source.vertical = text(table, "vertical");
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
     read_encoding(table, source);
-    read_bounds(table, source);
+    source.bounds = read_bounds(table);
     read_headers(table, source);
     if (const toml::node* dimensions = table.get("dimensions")) {
       const toml::table* values = dimensions->as_table();
@@ -340,31 +377,33 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
     add_service(source, table);
     return table;
   }
-  if (source.type == "xyz" || source.type == "cesium-terrain") {
-    SourceSpec usual;
-    if (source.type == "cesium-terrain") {
-      usual.tile_size = kTerrainSize;
-      usual.max_level = kEveryLevel;
-    }
-    table.insert("url", source.url);
-    if (!source.subdomains.empty()) {
-      toml::array names;
-      for (const std::string& name : source.subdomains) names.push_back(name);
-      table.insert("subdomains", std::move(names));
-    }
-    if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
-    if (source.projection != usual.projection) table.insert("projection", source.projection);
-    if (!source.encoding.empty()) table.insert("encoding", source.encoding);
-    if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
-    if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
-    if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
-    if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
-    if (source.vertical) table.insert("vertical", *source.vertical);
-    return table;
+  SourceSpec usual;
+  if (source.type == "cesium-terrain") {
+    usual.tile_size = kTerrainSize;
+    usual.max_level = kEveryLevel;
   }
-  const auto relative = source.path.lexically_relative(folder);
-  const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
-  table.insert("path", (inside ? relative : source.path).generic_string());
+  if (!source.url.empty()) {
+    table.insert("url", source.url);
+  } else {
+    const auto relative = source.path.lexically_relative(folder);
+    const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
+    table.insert("path", (inside ? relative : source.path).generic_string());
+  }
+  if (!source.subdomains.empty()) {
+    toml::array names;
+    for (const std::string& name : source.subdomains) names.push_back(name);
+    table.insert("subdomains", std::move(names));
+  }
+  if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
+  if (!source.table.empty()) table.insert("table", source.table);
+  if (source.projection != usual.projection) table.insert("projection", source.projection);
+  if (!source.encoding.empty()) table.insert("encoding", source.encoding);
+  if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
+  if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
+  if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
+  if (source.bounds) {
+    table.insert("bounds", edges_array(*source.bounds));
+  }
   if (source.crs) table.insert("crs", *source.crs);
   if (source.vertical) table.insert("vertical", *source.vertical);
   if (source.no_data) table.insert("no_data", *source.no_data);

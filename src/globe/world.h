@@ -47,8 +47,8 @@ struct SourceSpec {
   std::optional<double> offset;
   std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
 
-  // Of types "xyz" and "cesium-terrain"; there `path` is empty.
-  std::string url;                          ///< see source::TileTemplate; or of a layer.json
+  // Of sources on servers ("xyz", "cesium-terrain", "cog", "pmtiles"); there `path` is empty.
+  std::string url;                          ///< see source::TileTemplate; or of a layer.json, or the file
   std::vector<std::string> subdomains;
   std::map<std::string, std::string> headers;
   std::string projection = "web-mercator";  ///< or "geographic"
@@ -57,6 +57,7 @@ struct SourceSpec {
   int min_level = 0;
   int max_level = 18;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees
+  std::string table;                        ///< of a GeoPackage; empty: the only one
 
   ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like
 };
@@ -97,7 +98,8 @@ Result<void> save_world(const World& world, const std::filesystem::path& file);
 /// Errors: not_found, naming the places looked at.
 Result<std::filesystem::path> default_data_folder();
 
-/// What a command line's WORLD means: nothing is the default world, *.toml a world file, anything else a raster: shown on the
+/// What a command line's WORLD means: nothing is the default world, *.toml a world file, *.mbtiles, *.gpkg, *.pmtiles an archive of
+/// tiles, a URL tiles, or a file of them, or a GeoTIFF on a server, by its ending; anything else a raster: shown on the
 /// body that its CRS names, over the default world's layers if that is the Earth.
 Result<World> resolve_world(const std::string& argument);
 

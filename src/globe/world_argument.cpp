@@ -2,6 +2,7 @@
 #include "globe/world.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -66,8 +67,43 @@ Result<World> world_of_raster(const std::filesystem::path& file) {
   return world;
 }
 
+/// The type of source of a file or URL, by the end of its name; empty: none of those that hold tiles or parts.
+std::string type_by_name(const std::string& name) {
+  std::string ending = std::filesystem::path(name).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".mbtiles") return "mbtiles";
+  if (ending == ".gpkg") return "geopackage";
+  if (ending == ".pmtiles") return "pmtiles";
+  return ending == ".tif" || ending == ".tiff" ? "cog" : "";
+}
+
+/// An archive of tiles, or a GeoTIFF on a server, over the default world.
+Result<World> world_of_archive(const std::string& type, const std::string& url, const std::filesystem::path& file) {
+  auto world = default_world();
+  if (!world) return world.error();
+  world->file.clear();
+  LayerSpec layer;
+  layer.source.type = type;
+  layer.source.url = url;
+  if (url.empty()) {
+    std::error_code failure;
+    if (!std::filesystem::exists(file, failure)) return Error{ErrorCode::not_found, fmt::format("{}: no such file", file.string())};
+    layer.source.path = std::filesystem::absolute(file, failure).lexically_normal();
+    layer.name = file.filename().string();
+    // Of the three only GeoPackages say whether they hold heights; what else is wrong is said when the layer is opened.
+    const auto raster = type == "geopackage" ? source::body_of_raster(file) : Result<source::RasterBody>(Error{});
+    if (raster && raster->kind == source::SampleKind::height) layer.group = LayerGroup::height;
+  } else {
+    layer.name = fetch::public_part(url);
+  }
+  world->layers.push_back(std::move(layer));
+  return world;
+}
+
 /// Tiles of colours over the default world.
 Result<World> world_of_tiles(const std::string& url) {
+  const std::string type = type_by_name(fetch::public_part(url));
+  if (url.find('{') == std::string::npos && (type == "pmtiles" || type == "cog")) return world_of_archive(type, url, {});
   if (const auto address = source::TileTemplate::parse(url, {}); !address) return Error{address.error().code, fmt::format("{}: {}", fetch::public_part(url), address.error().message)};
   auto world = default_world();
   if (!world) return world.error();
@@ -89,6 +125,8 @@ Result<World> resolve_world(const std::string& argument) {
     return Error{ErrorCode::unsupported, fmt::format("{}: tiles come by http:// or https:// only", argument)};
   const std::filesystem::path file(argument);
   if (file.extension() == ".toml") return load_world(file);
+  const std::string type = type_by_name(argument);
+  if (!type.empty() && type != "cog") return world_of_archive(type, {}, file);
   return world_of_raster(file);
 }
 

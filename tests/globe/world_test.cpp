@@ -89,7 +89,7 @@ TEST_CASE("parse_world: mistakes name the file and the line") {
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[layer]\ngroup = \"color\"\n"), "two brackets"));
   CHECK(contains(message_of("[[layer]]\ngroup = \n"), "w.toml:2: not valid TOML"));
-  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"wms\", url = \"u\" }\n"), "\"wms\""));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"wfs\", url = \"u\" }\n"), "\"wfs\""));
   const auto tiles = [](const std::string& more) {
     return message_of("[[layer]]\ngroup = \"height\"\nsource = { type = \"xyz\", url = \"http://h/{z}/{x}/{y}.png\"" + more + " }\n");
   };
@@ -206,6 +206,47 @@ TEST_CASE("to_toml: services come back with all that was said of them") {
     CHECK(w->layers[2].source.url == "https://host/tms/");
     CHECK(w->layers[2].name == "https://host/tms/");
   }
+}
+
+TEST_CASE("to_toml: archives and remote rasters come back with all that was said of them") {
+  const std::string text =
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"mbtiles\", path = \"a.mbtiles\" }\n"
+      "[[layer]]\ngroup = \"height\"\nsource = { type = \"geopackage\", path = \"b.gpkg\", table = \"dem\", encoding = \"terrarium\", vertical = \"egm96\", bounds = [1, 2, 3, 4] }\n"
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"pmtiles\", url = \"https://h/c.pmtiles?key=1\", headers = { A = \"b\" } }\n"
+      "[[layer]]\ngroup = \"height\"\nsource = { type = \"cog\", url = \"https://h/d.tif\", headers = { A = \"b\" }, crs = \"EPSG:3857\", no_data = -1, scale = 2, offset = 3, bands = [3, 2, 1] }\n";
+  const auto first = parse_world(text, "/folder", "w.toml");
+  REQUIRE(first);
+  const auto second = parse_world(to_toml(*first), "/folder", "w.toml");
+  REQUIRE(second);
+  for (const World* world : {&*first, &*second}) {
+    REQUIRE(world->layers.size() == 4);
+    CHECK(world->layers[0].source.path == "/folder/a.mbtiles");
+    CHECK(world->layers[0].name == "a");
+    const SourceSpec& package = world->layers[1].source;
+    CHECK(package.type == "geopackage");
+    CHECK(package.table == "dem");
+    CHECK(package.encoding == "terrarium");
+    CHECK(package.vertical == "egm96");
+    CHECK(package.bounds == std::array<double, 4>{1, 2, 3, 4});
+    CHECK(world->layers[2].source.url == "https://h/c.pmtiles?key=1");
+    CHECK(world->layers[2].source.headers.at("A") == "b");
+    CHECK(world->layers[2].name == "https://h/c.pmtiles");
+    const SourceSpec& cog = world->layers[3].source;
+    CHECK(cog.type == "cog");
+    CHECK(cog.crs == "EPSG:3857");
+    CHECK(cog.no_data == -1.0);
+    CHECK(cog.scale == 2.0);
+    CHECK(cog.offset == 3.0);
+    CHECK(cog.bands == std::array<int, 3>{3, 2, 1});
+    CHECK(cog.path.empty());
+  }
+  const auto refused = [](const std::string& source) { return message_of("[[layer]]\ngroup = \"color\"\nsource = { " + source + " }\n"); };
+  CHECK(contains(refused("type = \"mbtiles\", url = \"http://h/a.mbtiles\""), "no key `url`"));
+  CHECK(contains(refused("type = \"mbtiles\""), "no `path`"));
+  CHECK(contains(refused("type = \"pmtiles\", url = \"http://h/a\", path = \"a\""), "only one of them"));
+  CHECK(contains(refused("type = \"pmtiles\", url = \"ftp://h/a\""), "http://"));
+  CHECK(contains(refused("type = \"cog\", path = \"a.tif\""), "no key `path`"));
+  CHECK(contains(refused("type = \"cog\", url = \"a.tif\""), "needs a `url`"));
 }
 
 TEST_CASE("load_world: a file that is not there is named") {

@@ -19,6 +19,7 @@
 #include "source/grid_coverage.h"
 #include "source/proj/pixel_mapping.h"
 #include "source/tiles/archive_tile.h"
+#include "source/tiles/height_decoders.h"
 #include "source/tiles/sqlite_archive.h"
 #include "source/tiles/tile_archive.h"
 #include "source/tiles/tile_pyramid.h"
@@ -51,7 +52,7 @@ class GeopackageTiles final : public TileSupply {
       : database_(std::move(database)), table_(std::move(table)), zooms_(std::move(zooms)),
         find_tile_(fmt::format("SELECT tile_data, id FROM {} WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?", sql_name(table_.name))) {}
 
-  fetch::Asked ask(const TileAddress& tile, double) const override {
+  fetch::Asked ask(const TileAddress& tile, const TileWish&) const override {
     auto found = database_->rows(find_tile_, {zooms_[static_cast<std::size_t>(tile.zoom)], tile.column, tile.row}, 1);
     if (!found) return found.error();
     if (found->empty()) return fetch::File{};
@@ -219,7 +220,7 @@ Result<std::unique_ptr<RasterSource>> open_geopackage(const TileArchive& archive
     pyramid.sample_type = "Float32";
     pyramid.decode_heights = [heights = *table->heights](const std::string& bytes) { return gridded_heights(bytes, heights); };
   } else {
-    pyramid.decode_heights = picture_heights(archive.code);
+    pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
   }
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_of_contents(*table, pyramid.grid, world);
   pyramid.vertical = archive.vertical;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "source/tiles/archive_tile.h"
+#include "source/tiles/height_decoders.h"
 #include "source/tiles/sqlite_archive.h"
 #include "source/tiles/tile_archive.h"
 #include "source/tiles/tile_pyramid.h"
@@ -22,7 +23,7 @@ class Mbtiles final : public TileSupply {
  public:
   explicit Mbtiles(std::shared_ptr<const SqliteArchive> database) : database_(std::move(database)) {}
 
-  fetch::Asked ask(const TileAddress& tile, double) const override {
+  fetch::Asked ask(const TileAddress& tile, const TileWish&) const override {
     const std::int64_t row = (std::int64_t{1} << tile.zoom) - 1 - tile.row;
     auto found = database_->rows("SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?",
                                  {std::int64_t{tile.zoom}, tile.column, row}, 1);
@@ -107,7 +108,7 @@ Result<std::unique_ptr<RasterSource>> open_mbtiles(const TileArchive& archive, c
   pyramid.revision = database->revision();
   pyramid.grid = std::move(*grid);
   pyramid.kind = archive.kind;
-  pyramid.decode_heights = picture_heights(archive.code);
+  pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_in(said(*database, "bounds"));
   pyramid.vertical = archive.vertical;
   pyramid.is_remote = false;

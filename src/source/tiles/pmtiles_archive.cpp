@@ -15,6 +15,7 @@
 
 #include "base/gzip.h"
 #include "source/tiles/archive_tile.h"
+#include "source/tiles/height_decoders.h"
 #include "source/tiles/file_parts.h"
 #include "source/tiles/pmtiles.h"
 #include "source/tiles/tile_archive.h"
@@ -32,7 +33,8 @@ class PmtilesArchive final : public TileSupply {
   PmtilesArchive(std::unique_ptr<const FileParts> file, const pmtiles::Header& header, std::shared_ptr<const pmtiles::Directory> root)
       : file_(std::move(file)), header_(header), root_(std::move(root)) {}
 
-  fetch::Asked ask(const TileAddress& tile, double gain) const override {
+  fetch::Asked ask(const TileAddress& tile, const TileWish& wish) const override {
+    const double gain = wish.gain;
     Located located = locate(tile, gain);
     if (auto* asked = std::get_if<fetch::Asked>(&located)) return std::move(*asked);
     return contents(std::get<fetch::ByteRange>(located), gain);
@@ -212,7 +214,7 @@ Result<std::unique_ptr<RasterSource>> open_pmtiles(const TileArchive& archive, c
   pyramid.revision = revision;
   pyramid.grid = std::move(*grid);
   pyramid.kind = archive.kind;
-  pyramid.decode_heights = picture_heights(archive.code);
+  pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_in(*header);
   pyramid.vertical = archive.vertical;
   pyramid.is_remote = remote;

@@ -22,7 +22,7 @@ struct TileArchive {
   std::vector<std::string> headers{};        ///< "Name: value", sent with every request
   std::string table{};                       ///< GeoPackage: which of several; empty: the only one
   SampleKind kind = SampleKind::colour;
-  std::optional<raster::HeightCode> code{};  ///< of heights in pictures; nothing: heights are the first band's numbers
+  std::string encoding{};            ///< of heights: see height_decoder
   std::optional<std::array<double, 4>> bounds{};  ///< as TilePyramid::bounds; over what the archive says
   std::optional<std::string> vertical{};     ///< as GdalOptions::vertical
 };
