@@ -195,7 +195,7 @@ TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
   const auto part = [&](const std::string& path, ByteRange range) {
     Outcomes outcomes;
     Fetcher fetcher(hasty());
-    fetcher.start({server.url(path), {}, path, {}, range}, 0, outcomes.taker(path));
+    fetcher.start({server.url(path), {}, path, {}, 0, range}, make_gain(0), outcomes.taker(path));
     return outcomes.wait(1).front().second;
   };
   const Outcome middle = part("/file", {3, 4});

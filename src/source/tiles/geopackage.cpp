@@ -218,7 +218,7 @@ Result<std::unique_ptr<RasterSource>> open_geopackage(const TileArchive& archive
   pyramid.kind = archive.kind;
   if (table->heights) {
     pyramid.sample_type = "Float32";
-    pyramid.decode_heights = [heights = *table->heights](const std::string& bytes) { return gridded_heights(bytes, heights); };
+    pyramid.decode_heights = [heights = *table->heights](const std::string& bytes, const TileAddress&) { return gridded_heights(bytes, heights); };
   } else {
     pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
   }
