@@ -27,8 +27,8 @@ PMTILES = "earth/archives/bluemarble-merc.pmtiles"
 HALF = 20037508.342789244
 COGS = {  # file: planet, view, group
     "earth/regional/cog_int16_utm21n.tif": ("Earth", (73.4, -56.8, 300000, 0, -90), "color"),
-    "earth/regional/mosaic_cog1.tif": ("Earth", (46.0, -74.4, 250000, 20, -60), "color"),
-    "mars/cog_hirise_mars.tif": ("Mars", (-14.58, -53.57, 9000, 0, -90), "color"),
+    "earth/regional/mosaic_cog1.tif": ("Earth", (44.8, -74.9, 250000, 20, -60), "color"),
+    "mars/cog_hirise_mars.tif": ("Mars", (-14.749, -53.566, 9000, 0, -90), "color"),
 }
 
 
