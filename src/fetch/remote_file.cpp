@@ -1,5 +1,6 @@
 #include "fetch/remote_file.h"
 
+#include <limits>
 #include <utility>
 #include <variant>
 
@@ -10,11 +11,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double kFirst = std::numeric_limits<double>::infinity();  ///< the gain of what someone waits for
+
 /// What is asked for, waited for.
 Result<File> wait_until_there(ByteStore& store, const Request& request, std::chrono::milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   for (;;) {
-    Asked asked = store.ask(request);
+    Asked asked = store.ask(request, kFirst);
     if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
     if (auto* file = std::get_if<File>(&asked)) {
       if (!file->bytes) return Error{ErrorCode::not_found, fmt::format("{}: there is no such file", public_part(request.url))};
@@ -74,7 +77,7 @@ Asked RemoteFile::ask(const ByteRange& part, double gain) const {
 Result<std::shared_ptr<const std::string>> RemoteFile::wait_for(const ByteRange& part, std::chrono::milliseconds patience) const {
   const auto deadline = Clock::now() + patience;
   for (;;) {
-    Asked asked = ask(part, 0);
+    Asked asked = ask(part, kFirst);
     if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
     if (auto* file = std::get_if<File>(&asked)) return std::move(file->bytes);
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
