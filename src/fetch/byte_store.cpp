@@ -146,6 +146,9 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
     disk->renew(request.key, expires);
     return file_of(std::move(*old));
   }
+  if (request.refuse) {
+    if (auto why = request.refuse(outcome->body)) return Error{ErrorCode::unavailable, std::move(*why)};
+  }
   DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires, outcome->whole_bytes};
   if (disk) disk->put(request.key, entry);
   return file_of(std::move(entry));

@@ -29,6 +29,8 @@ struct Request {
   std::string etag{};                ///< of bytes that are there already: only others are sent
   double expected_bytes = 0;         ///< see Arrival
   std::optional<ByteRange> range{};  ///< this part only, or what there is of it before the file's end
+  /// What is wrong with bytes that the server calls good, such as an exception in place of a picture: a message; they are not kept.
+  std::function<std::optional<std::string>(const std::string& bytes)> refuse{};
 };
 
 /// The end of a transfer that the server answered.

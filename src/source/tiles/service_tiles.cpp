@@ -27,6 +27,19 @@ bool over_in_time(fetch::Arrival& arrival) {
   return future.wait_for(kLongestWait) == std::future_status::ready;
 }
 
+/// How a service says that there is no such tile.
+bool is_out_of_range(const std::string& bytes) {
+  const auto exception = service_exception(bytes);
+  return exception && exception->find("TileOutOfRange") != std::string::npos;
+}
+
+/// What is wrong with bytes that are no picture but an exception of the service.
+std::optional<std::string> refusal(const std::string& url, const std::string& bytes) {
+  const auto exception = service_exception(bytes);
+  if (!exception || is_out_of_range(bytes)) return std::nullopt;
+  return fmt::format("{}: the service answers: {}", fetch::public_part(url), without_secrets(*exception, url, fetch::without_credentials(url)));
+}
+
 class ServiceTiles final : public TileSupply {
  public:
   ServiceTiles(UrlOfTile url_of, std::vector<std::string> headers, std::string key_prefix, std::shared_ptr<fetch::ByteStore> store)
@@ -35,15 +48,11 @@ class ServiceTiles final : public TileSupply {
   fetch::Asked ask(const TileAddress& tile, const TileWish& wish) const override {
     const std::string url = url_of_(tile);
     if (url.empty()) return fetch::File{};
-    fetch::Asked asked = store_->ask({url, headers_, key_of(tile), {}, wish.expected_bytes}, wish.gain);
+    const auto refuse = [url](const std::string& bytes) { return refusal(url, bytes); };
+    fetch::Asked asked = store_->ask({url, headers_, key_of(tile), {}, wish.expected_bytes, refuse}, wish.gain);
     const auto* file = std::get_if<fetch::File>(&asked);
-    if (!file || !file->bytes) return asked;
-    const auto exception = service_exception(*file->bytes);
-    if (!exception) return asked;
-    if (exception->find("TileOutOfRange") != std::string::npos) return fetch::File{};
-    const std::string why = fmt::format("{}: the service answers: {}", fetch::public_part(url), without_secrets(*exception, url, fetch::without_credentials(url)));
-    store_->reject(key_of(tile), why);
-    return Error{ErrorCode::unavailable, why};
+    if (file && file->bytes && is_out_of_range(*file->bytes)) return fetch::File{};
+    return asked;
   }
   void reject(const TileAddress& tile, const std::string& why) const override { store_->reject(key_of(tile), why); }
   std::string name_of(const TileAddress& tile) const override { return fmt::format("{} (tile {}/{}/{})", fetch::public_part(url_of_(tile)), tile.zoom, tile.column, tile.row); }
