@@ -16,6 +16,8 @@
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
 #include "fetch/byte_store.h"
+#include "source/debug/scale_reference.h"
+#include "source/debug/tile_index.h"
 #include "source/gdal/gdal_source.h"
 #include "source/tiles/cesium_terrain.h"
 #include "source/tiles/service_source.h"
@@ -53,6 +55,7 @@ source::GdalOptions gdal_options(const LayerSpec& layer) {
   options.scale = layer.source.scale;
   options.offset = layer.source.offset;
   options.rgb_bands = layer.source.bands;
+  options.bounds = layer.source.bounds;
   return options;
 }
 
@@ -186,6 +189,8 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
   if (type == "mbtiles") return source::open_mbtiles(tile_archive(spec), world.ellipsoid);
   if (type == "geopackage") return source::open_geopackage(tile_archive(spec), world.ellipsoid);
   if (type == "pmtiles") return source::open_pmtiles(tile_archive(spec), world.ellipsoid, spec.source.url.empty() ? nullptr : needed_store());
+  if (spec.source.type == "tile-index") return source::open_tile_index({spec.source.projection == "geographic", spec.source.tile_size}, world.ellipsoid);
+  if (spec.source.type == "scale") return source::open_scale_reference(spec.source.unit == "m" ? source::ScaleUnit::metres : source::ScaleUnit::kilometres, world.ellipsoid);
   source::GdalOptions how = gdal_options(spec);
   if (type == "cog") {
     how.path = spec.source.url;

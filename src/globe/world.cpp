@@ -23,6 +23,9 @@ constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "gra
 
 bool is_service(const std::string& type) { return type == "wmts" || type == "wms" || type == "tms"; }
 
+/// Sources that need neither file nor server.
+bool is_drawn_by_itself(const std::string& type) { return type == "tile-index" || type == "scale"; }
+
 bool is_web_address(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
 bool is_archive(const std::string& type) { return type == "mbtiles" || type == "geopackage" || type == "pmtiles"; }
@@ -101,7 +104,9 @@ class WorldReader {
     } else {
       fail(table, "the layer has no `source`");
     }
-    const std::string unnamed = !layer.source.url.empty() ? fetch::public_part(layer.source.url) : layer.source.path.stem().string();
+    const std::string& type = layer.source.type;
+    if (is_drawn_by_itself(type) && layer.group == LayerGroup::height) fail(table, fmt::format("a source of type \"{}\" is a picture: its group is \"color\"", type));
+    const std::string unnamed = !layer.source.url.empty() ? fetch::public_part(layer.source.url) : is_drawn_by_itself(type) ? type : layer.source.path.stem().string();
     layer.name = text(table, "name").value_or(unnamed);
     return layer;
   }
@@ -113,11 +118,14 @@ class WorldReader {
     if (source.type == "cog") return read_cog(table, source);
     if (is_archive(source.type)) return read_archive(table, source);
     if (is_service(source.type)) return read_service(table, source);
-    if (source.type != "gdal") {
+    if (is_drawn_by_itself(source.type)) return read_drawn(table, source);
+    const bool image = source.type == "image";
+    if (source.type != "gdal" && !image) {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("no source is of type \"{}\": it is gdal, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles or cog", source.type), ErrorCode::unsupported);
+                  fmt::format("no source is of type \"{}\": it is gdal, image, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles, cog, tile-index or scale", source.type), ErrorCode::unsupported);
     }
-    expect_keys(table, "source", {"type", "path", "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    expect_keys(table, "source", {"type", "path", image ? "bounds" : "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    if (image) source.bounds = read_bounds(table, 360.0).value_or(std::array{-180.0, -90.0, 180.0, 90.0});
     read_path(table, source);
     read_samples(table, source);
   }
@@ -181,22 +189,6 @@ class WorldReader {
       fail(*table.get("encoding"), fmt::format("no encoding is called \"{}\": it is {}; without one, heights are the first band's numbers", source.encoding, source::height_encodings()));
   }
 
-  std::optional<std::array<double, 4>> read_bounds(const toml::table& table) {
-    const toml::node* bounds = table.get("bounds");
-    if (!bounds) return std::nullopt;
-    std::array<double, 4> edges{};
-    const toml::array* list = bounds->as_array();
-    bool good = list && list->size() == 4;
-    for (std::size_t i = 0; good && i < 4; ++i) {
-      const auto edge = (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
-      good = edge && std::abs(*edge) <= (i % 2 == 0 ? 180.0 : 90.0);
-      if (good) edges[i] = *edge;
-    }
-    if (good && edges[0] < edges[2] && edges[1] < edges[3]) return edges;
-    fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
-    return std::nullopt;
-  }
-
   void read_headers(const toml::table& table, SourceSpec& source) {
     const toml::node* headers = table.get("headers");
     if (!headers) return;
@@ -215,9 +207,7 @@ class WorldReader {
     source.url = text(table, "url").value_or("");
     if (!is_web_address(source.url)) fail(table, "the source needs a `url` of http:// or https://, for example \"http://host/{z}/{x}/{y}.png\"");
     source.vertical = text(table, "vertical");
-    source.projection = text(table, "projection").value_or("web-mercator");
-    if (source.projection != "web-mercator" && source.projection != "geographic")
-      fail(*table.get("projection"), "`projection` is \"web-mercator\" or \"geographic\"");
+    read_projection(table, source);
     read_encoding(table, source);
     source.tile_size = static_cast<int>(number(table, "tile_size", 16, 4096).value_or(256));
     source.min_level = static_cast<int>(number(table, "min_level", 0, 30).value_or(0));
@@ -284,6 +274,41 @@ class WorldReader {
         else fail(value, fmt::format("the dimension `{}` must be text in quotes", name.str()));
       }
     }
+  }
+
+  /// `most`: the largest longitude; beyond 180 the bounds lie across it.
+  std::optional<std::array<double, 4>> read_bounds(const toml::table& table, double most = 180.0) {
+    const toml::node* bounds = table.get("bounds");
+    if (!bounds) return std::nullopt;
+    std::array<double, 4> edges{};
+    const toml::array* list = bounds->as_array();
+    bool good = list && list->size() == 4;
+    for (std::size_t i = 0; good && i < 4; ++i) {
+      const auto edge = (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
+      good = edge && std::abs(*edge) <= (i % 2 == 0 ? most : 90.0);
+      if (good) edges[i] = *edge;
+    }
+    if (good && edges[0] < edges[2] && edges[1] < edges[3] && edges[2] - edges[0] <= 360.0) return edges;
+    fail(*bounds, "`bounds` must be [west, south, east, north] in degrees, west < east and south < north");
+    return std::nullopt;
+  }
+
+  void read_drawn(const toml::table& table, SourceSpec& source) {
+    if (source.type == "scale") {
+      expect_keys(table, "source", {"type", "unit"});
+      source.unit = text(table, "unit").value_or("km");
+      if (source.unit != "m" && source.unit != "km") fail(*table.get("unit"), "`unit` is \"m\" or \"km\"");
+      return;
+    }
+    expect_keys(table, "source", {"type", "projection", "tile_size"});
+    read_projection(table, source);
+    source.tile_size = static_cast<int>(number(table, "tile_size", 32, 1024).value_or(256));
+  }
+
+  void read_projection(const toml::table& table, SourceSpec& source) {
+    source.projection = text(table, "projection").value_or("web-mercator");
+    if (source.projection != "web-mercator" && source.projection != "geographic")
+      fail(*table.get("projection"), "`projection` is \"web-mercator\" or \"geographic\"");
   }
 
   std::optional<std::string> text(const toml::table& table, std::string_view key) {
@@ -375,6 +400,15 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   table.insert("type", source.type);
   if (is_service(source.type)) {
     add_service(source, table);
+    return table;
+  }
+  if (source.type == "tile-index") {
+    table.insert("projection", source.projection);
+    table.insert("tile_size", source.tile_size);
+    return table;
+  }
+  if (source.type == "scale") {
+    table.insert("unit", source.unit);
     return table;
   }
   SourceSpec usual;

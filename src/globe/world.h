@@ -47,7 +47,9 @@ struct SourceSpec {
   std::optional<double> offset;
   std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
 
-  // Of sources on servers ("xyz", "cesium-terrain", "cog", "pmtiles"); there `path` is empty.
+  std::string unit = "km";                  ///< of type "scale": or "m"
+
+  // Of sources on servers ("xyz", "cesium-terrain", "cog", "pmtiles", some of "tile-index"); there `path` is empty.
   std::string url;                          ///< see source::TileTemplate; or of a layer.json, or the file
   std::vector<std::string> subdomains;
   std::map<std::string, std::string> headers;
@@ -56,7 +58,7 @@ struct SourceSpec {
   int tile_size = 256;
   int min_level = 0;
   int max_level = 18;
-  std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees
+  std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees; of type "image" too
   std::string table;                        ///< of a GeoPackage; empty: the only one
 
   ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like

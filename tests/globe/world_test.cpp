@@ -249,6 +249,35 @@ TEST_CASE("to_toml: archives and remote rasters come back with all that was said
   CHECK(contains(refused("type = \"cog\", url = \"a.tif\""), "needs a `url`"));
 }
 
+TEST_CASE("parse_world: debug sources and pictures come back from what is written") {
+  const std::string text =
+      "[[layer]]\ngroup = \"overlay\"\nsource = { type = \"tile-index\", projection = \"geographic\", tile_size = 512 }\n"
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"scale\", unit = \"m\" }\n"
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"image\", path = \"a.png\", bounds = [170, -10, 190.5, 10] }\n"
+      "[[layer]]\ngroup = \"color\"\nsource = { type = \"image\", path = \"b.png\" }\n";
+  const auto first = parse_world(text, "/folder", "w.toml");
+  REQUIRE(first);
+  const auto second = parse_world(to_toml(*first), "/folder", "w.toml");
+  REQUIRE(second);
+  for (const World* world : {&*first, &*second}) {
+    REQUIRE(world->layers.size() == 4);
+    CHECK(world->layers[0].name == "tile-index");
+    CHECK(world->layers[0].source.projection == "geographic");
+    CHECK(world->layers[0].source.tile_size == 512);
+    CHECK(world->layers[1].source.unit == "m");
+    CHECK(world->layers[2].source.path == "/folder/a.png");
+    CHECK(world->layers[2].source.bounds == std::array<double, 4>{170, -10, 190.5, 10});
+    CHECK(world->layers[3].source.bounds == std::array<double, 4>{-180, -90, 180, 90});
+  }
+  const auto source = [](const std::string& group, const std::string& more) { return message_of("[[layer]]\ngroup = \"" + group + "\"\nsource = { type = " + more + " }\n"); };
+  CHECK(contains(source("height", "\"scale\""), "is a picture"));
+  CHECK(contains(source("color", "\"scale\", unit = \"mile\""), "`unit`"));
+  CHECK(contains(source("color", "\"tile-index\", tile_size = 4"), "`tile_size`"));
+  CHECK(contains(source("color", "\"tile-index\", path = \"x\""), "no key `path`"));
+  CHECK(contains(source("color", "\"image\""), "no `path`"));
+  CHECK(contains(source("color", "\"image\", path = \"x\", bounds = [-200, 0, 170, 10]"), "`bounds`"));
+}
+
 TEST_CASE("load_world: a file that is not there is named") {
   const auto world = load_world("/no/such/world.toml");
   REQUIRE_FALSE(world);

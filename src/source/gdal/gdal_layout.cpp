@@ -8,6 +8,7 @@
 
 #include <cpl_string.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ogr_spatialref.h>
 
 #include "source/gdal/gdal_runtime.h"
@@ -46,10 +47,16 @@ Result<std::string> crs_wkt(GDALDataset& dataset, const GdalOptions& options) {
   return wkt;
 }
 
-Result<Georeference> find_georeference(GDALDataset& dataset, const GdalOptions& options) {
+Result<Georeference> find_georeference(GDALDataset& dataset, const GdalOptions& options, const geo::Ellipsoid& world) {
   Georeference result;
   result.width = dataset.GetRasterXSize();
   result.height = dataset.GetRasterYSize();
+  if (options.bounds) {
+    const auto [west, south, east, north] = *options.bounds;
+    result.crs = geographic_crs(world);
+    result.transform = {west, (east - west) / result.width, 0.0, north, 0.0, (south - north) / result.height};
+    return result;
+  }
   if (dataset.GetGeoTransform(result.transform.data()) != CE_None) {
     if (dataset.GetGCPCount() > 0 || dataset.GetMetadata("RPC") != nullptr) {
       return unsupported(options, "is placed by control points only; straighten it first: gdalwarp -t_srs EPSG:4326 IN OUT.tif");
@@ -240,6 +247,7 @@ std::string revision_of(GDALDataset& dataset, const GdalOptions& options) {
   add("no_data", options.no_data);
   add("scale", options.scale);
   add("offset", options.offset);
+  if (options.bounds) text += fmt::format("|bounds={}", fmt::join(*options.bounds, ","));
   if (options.kind) text += fmt::format("|kind={}", static_cast<int>(*options.kind));
   if (options.rgb_bands) text += fmt::format("|rgb={},{},{}", (*options.rgb_bands)[0], (*options.rgb_bands)[1], (*options.rgb_bands)[2]);
   return text;
@@ -266,7 +274,7 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   about.sample_type = GDALGetDataTypeName(type);
   if (GDALDataTypeIsComplex(type)) return unsupported(options, fmt::format("has complex samples ({}); make them real first: gdal_calc.py", about.sample_type));
 
-  Result<Georeference> georeference = find_georeference(dataset, options);
+  Result<Georeference> georeference = find_georeference(dataset, options, world);
   if (!georeference) return georeference.error();
   layout.georeference = std::move(georeference).value();
   about.crs_wkt = layout.georeference.crs;

@@ -25,6 +25,7 @@ struct GdalOptions {
   std::optional<double> scale{};           ///< value = sample * scale + offset; else the file's own
   std::optional<double> offset{};
   std::optional<std::array<int, 3>> rgb_bands{};  ///< 1-based
+  std::optional<std::array<double, 4>> bounds{};  ///< west, south, east, north in degrees: where it lies, whatever it says itself
   std::string unpack_folder{};             ///< for copies of rasters that cannot be read in parts; empty: no copies
 };
 

@@ -196,6 +196,11 @@ Projection::Projection(Projection&&) noexcept = default;
 Projection& Projection::operator=(Projection&&) noexcept = default;
 Projection::~Projection() = default;
 
+std::string geographic_crs(const geo::Ellipsoid& world) {
+  const bool on_earth = std::abs(world.a() / geo::kWgs84.a() - 1.0) <= 0.01;
+  return on_earth ? "OGC:CRS84" : fmt::format("+proj=longlat +a={:.3f} +b={:.3f} +no_defs", world.a(), world.b());
+}
+
 Result<Projection> Projection::create(const std::string& crs, const geo::Ellipsoid& world, glm::dvec2 centre) {
   auto state = std::make_unique<State>();
   if (Result<void> opened = state->open(crs, world, centre); !opened) return opened.error();

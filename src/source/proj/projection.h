@@ -22,6 +22,9 @@ struct CrsFacts {
   std::string vertical;  ///< name of the vertical part; "ellipsoid" for a three-dimensional geographic CRS; else empty
 };
 
+/// The geographic CRS of a world, east first, as `Projection::create` takes it: longitudes and latitudes by the world's own radii.
+std::string geographic_crs(const geo::Ellipsoid& world);
+
 class Projection {
  public:
   /// `crs` is anything that PROJ understands (WKT, "EPSG:3857", ...). `centre`: coordinates in the raster's middle; where
