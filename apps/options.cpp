@@ -151,6 +151,7 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
   globe_options.cache_folder = options.disk_cache;
   globe_options.disk_cache_bytes = options.disk_cache_bytes;
   globe_options.offline = options.offline;
+  globe_options.time = options.view.time;
   auto globe = globe::Globe::open(std::move(*world), globe_options);
   if (globe) {
     for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);

@@ -13,6 +13,7 @@
 #include "cache/block_cache.h"
 #include "globe/height_tables.h"
 #include "globe/kept_files.h"
+#include "globe/surface_steps.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
 #include "fetch/byte_store.h"
@@ -23,6 +24,7 @@
 #include "source/tiles/service_source.h"
 #include "source/tiles/tile_archive.h"
 #include "source/tiles/tiled_source.h"
+#include "surface/surface_facts_made.h"
 
 namespace tellurion::globe {
 namespace {
@@ -149,9 +151,12 @@ struct Globe::State {
   std::shared_ptr<fetch::ByteStore> store;  ///< null: no layer needs it
   std::shared_ptr<const surface::SurfaceDescription> surface;
   std::vector<LayerInfo> layers;
+  std::unique_ptr<SurfaceSteps> steps;
 
   mutable std::mutex mutex;  ///< guards what follows
+  std::shared_ptr<const surface::ErrorTable> table;
   std::shared_ptr<const surface::SurfaceFacts> facts;
+  std::vector<std::pair<std::shared_ptr<const surface::SurfaceDescription>, std::shared_ptr<const surface::SurfaceFacts>>> other_facts;  ///< of other times
   std::vector<SourceStats> sources;
 
   std::vector<std::unique_ptr<SurfaceWorker>> workers;
@@ -161,6 +166,7 @@ struct Globe::State {
   std::shared_ptr<fetch::ByteStore> needed_store();
   Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
   void open_layers();
+  void take_table(std::shared_ptr<const surface::ErrorTable> found);
 };
 
 /// The store of bytes, made for the first layer that needs it.
@@ -201,26 +207,15 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
 }
 
 void Globe::State::open_layers() {
-  auto description = std::make_shared<surface::SurfaceDescription>();
-  description->ellipsoid = world.ellipsoid;
   for (const LayerSpec& spec : world.layers) {
     LayerInfo info;
     info.spec = spec;
     SourceStats stats;
     stats.name = spec.name;
-    if (spec.enabled && is_drawn(spec.group)) {
+    if (spec.enabled && is_drawn(spec.group) && !spec.source.time) {
       auto source = open_source(spec);
       if (source) {
-        surface::Layer layer;
-        layer.name = spec.name;
-        layer.source = std::move(*source);
-        layer.source_id = static_cast<std::uint32_t>(layers.size());
-        layer.opacity = static_cast<float>(spec.opacity);
-        layer.gamma = static_cast<float>(spec.gamma);
-        layer.multiplier = static_cast<float>(spec.multiplier);
-        layer.adds = spec.adds;
-        info.raster = layer.source;
-        (spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
+        info.raster = std::move(*source);
       } else {
         const std::string place = spec.line > 0 ? fmt::format("{}:{}: ", world.file.string(), spec.line) : "";
         stats.errors = 1;
@@ -230,12 +225,24 @@ void Globe::State::open_layers() {
     layers.push_back(std::move(info));
     sources.push_back(std::move(stats));
   }
-  // Groups draw in their order, whatever the file's.
-  std::stable_sort(description->colours.begin(), description->colours.end(), [&](const auto& a, const auto& b) {
-    return layers[a.source_id].spec.group < layers[b.source_id].spec.group;
-  });
-  description->revision = 1;
-  surface = std::move(description);
+  std::vector<LayerInfo> drawn = layers;
+  for (LayerInfo& info : drawn) {
+    if (!is_drawn(info.spec.group)) info.spec.source.time.reset();
+  }
+  steps = std::make_unique<SurfaceSteps>(world.ellipsoid, drawn, [this](const LayerSpec& spec) { return open_source(spec); });
+  surface = steps->at(options.time);
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::vector<std::uint32_t> ids = steps->source_ids(i);
+    const auto shown = std::ranges::find_if(surface->colours, [&](const surface::Layer& l) { return std::ranges::find(ids, l.source_id) != ids.end(); });
+    if (shown != surface->colours.end()) layers[i].raster = shown->source;
+  }
+}
+
+void Globe::State::take_table(std::shared_ptr<const surface::ErrorTable> found) {
+  std::lock_guard lock(mutex);
+  table = std::move(found);
+  facts = surface::make_facts(surface, table);
+  other_facts.clear();
 }
 
 Globe::Globe(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -251,10 +258,7 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
   for (int i = 0; i < std::max(threads, 1); ++i) s.workers.push_back(std::make_unique<SurfaceWorker>(s.blocks));
   s.pool = std::make_unique<WorkerPool>(threads, kWaitingJobs);
   s.tables = std::make_unique<HeightTables>(s.surface, s.blocks, options.cache_folder, *s.pool,
-                                            [&s](std::shared_ptr<const surface::SurfaceFacts> facts) {
-                                              std::lock_guard lock(s.mutex);
-                                              s.facts = std::move(facts);
-                                            });
+                                            [&s](std::shared_ptr<const surface::ErrorTable> table) { s.take_table(std::move(table)); });
   s.tables->load(options.scan_heights);
   return globe;
 }
@@ -262,6 +266,7 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
 const World& Globe::world() const { return state_->world; }
 const geo::Ellipsoid& Globe::ellipsoid() const { return state_->world.ellipsoid; }
 const std::vector<LayerInfo>& Globe::layers() const { return state_->layers; }
+std::string Globe::step_of(std::size_t layer, const std::optional<UtcTime>& time) const { return state_->steps->text_of(layer, time); }
 
 std::vector<std::string> Globe::hints() const {
   std::vector<std::string> hints;
@@ -276,19 +281,27 @@ std::vector<std::string> Globe::hints() const {
 
 std::vector<SourceStats> Globe::source_stats() const {
   std::vector<SourceStats> all = state_->sources;
-  for (std::size_t id = 0; id < all.size(); ++id) {
-    cache::SourceReads reads = state_->blocks.reads_of(static_cast<std::uint32_t>(id));
-    all[id].requests = reads.blocks + reads.errors;
-    all[id].bytes = reads.bytes;
-    all[id].errors += reads.errors;
-    if (reads.errors > 0) all[id].last_error = std::move(reads.last_error);
+  for (std::size_t layer = 0; layer < all.size(); ++layer) {
+    for (const std::uint32_t id : state_->steps->source_ids(layer)) {
+      cache::SourceReads reads = state_->blocks.reads_of(id);
+      all[layer].requests += reads.blocks + reads.errors;
+      all[layer].bytes += reads.bytes;
+      all[layer].errors += reads.errors;
+      if (reads.errors > 0) all[layer].last_error = std::move(reads.last_error);
+    }
+    const SurfaceSteps::Failures failures = state_->steps->failures_of(layer);
+    all[layer].errors += failures.count;
+    if (failures.count > 0) all[layer].last_error = failures.last_error;
   }
   return all;
 }
 
 bool Globe::data_missing() const {
-  for (std::size_t id = 0; id < state_->layers.size(); ++id) {
-    if (!state_->layers[id].error.empty() || state_->blocks.reads_of(static_cast<std::uint32_t>(id)).lost > 0) return true;
+  for (std::size_t layer = 0; layer < state_->layers.size(); ++layer) {
+    if (!state_->layers[layer].error.empty() || state_->steps->failures_of(layer).count > 0) return true;
+    for (const std::uint32_t id : state_->steps->source_ids(layer)) {
+      if (state_->blocks.reads_of(id).lost > 0) return true;
+    }
   }
   return false;
 }
@@ -350,6 +363,19 @@ std::shared_ptr<const surface::SurfaceDescription> Globe::surface() const { retu
 std::shared_ptr<const surface::SurfaceFacts> Globe::facts() const {
   std::lock_guard lock(state_->mutex);
   return state_->facts;
+}
+
+std::shared_ptr<const surface::SurfaceDescription> Globe::surface_at(const std::optional<UtcTime>& time) const { return state_->steps->at(time); }
+
+std::shared_ptr<const surface::SurfaceFacts> Globe::facts_of(const std::shared_ptr<const surface::SurfaceDescription>& surface) const {
+  State& s = *state_;
+  std::lock_guard lock(s.mutex);
+  if (surface == s.surface) return s.facts;
+  const auto found = std::ranges::find(s.other_facts, surface, [](const auto& entry) { return entry.first; });
+  if (found != s.other_facts.end()) return found->second;
+  if (s.other_facts.size() >= SurfaceSteps::kHeldSurfaces) s.other_facts.erase(s.other_facts.begin());
+  s.other_facts.emplace_back(surface, surface::make_facts(surface, s.table));
+  return s.other_facts.back().second;
 }
 
 bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) {

@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
+#include "base/time.h"
 #include "fetch/fetcher.h"
 #include "geo/ellipsoid.h"
 #include "globe/frame_stats.h"
@@ -35,6 +37,7 @@ struct GlobeOptions {
   std::size_t disk_cache_bytes = std::size_t{4} << 30;      ///< of files from servers, in the cache folder
   bool offline = false;                                     ///< no network: what the disk cache has counts, however old
   bool scan_heights = true;                                 ///< make error tables in the background
+  std::optional<UtcTime> time;                              ///< at which layers with times are opened first
 };
 
 /// Where caches are kept unless told otherwise: $XDG_CACHE_HOME/tellurion or ~/.cache/tellurion; empty if neither is set.
@@ -86,6 +89,8 @@ class Globe {
   view::Pose home() const;
 
   const std::vector<LayerInfo>& layers() const;
+  /// What of a layer with times is shown at `time`, as its path or URL has it; empty for others.
+  std::string step_of(std::size_t layer, const std::optional<UtcTime>& time) const;
 
   /// Sentences that a user should see: layers left out, data without a vertical datum.
   std::vector<std::string> hints() const;
@@ -107,8 +112,11 @@ class Globe {
   Result<HeightSampler> height_sampler() const;
 
   // For the views of this globe.
-  std::shared_ptr<const surface::SurfaceDescription> surface() const;
-  std::shared_ptr<const surface::SurfaceFacts> facts() const;   ///< replaced when the tables are ready
+  std::shared_ptr<const surface::SurfaceDescription> surface() const;  ///< at GlobeOptions::time; its heights hold at all times
+  std::shared_ptr<const surface::SurfaceFacts> facts() const;   ///< of it; replaced when the tables are ready
+  /// The surface at another time (opens files where a step comes up): the same object while no layer's step changes.
+  std::shared_ptr<const surface::SurfaceDescription> surface_at(const std::optional<UtcTime>& time) const;
+  std::shared_ptr<const surface::SurfaceFacts> facts_of(const std::shared_ptr<const surface::SurfaceDescription>& surface) const;
   /// Runs `work` on a worker with its own readers. False if too much waits; never waits itself.
   bool try_submit(std::function<void(SurfaceWorker&)> work);
   /// Without threads: runs a waiting job. False if there is none, or there are threads.

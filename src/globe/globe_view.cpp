@@ -10,6 +10,7 @@
 
 #include "base/bounded_queue.h"
 #include "geo/sun.h"
+#include "globe/slot_ages.h"
 #include "globe/surface_worker.h"
 
 namespace tellurion::globe {
@@ -34,6 +35,7 @@ double ms_since(Clock::time_point start) {
 struct Finished {
   geo::TileKey key;
   Part part = Part::geometry;
+  std::uint64_t revision = 0;  ///< of the surface that it shows
   std::variant<surface::TileGeometry, surface::TileImagery, source::Awaited, Error> content;
 };
 
@@ -140,13 +142,17 @@ class Motion {
 };
 
 struct GlobeView::State {
-  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()) {}
+  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()), surface(g.surface()) {}
 
   Globe& globe;
   gpu::RenderThread& thread;
   std::unique_ptr<render::Renderer> renderer;
   surface::TileTree tree;
-  std::shared_ptr<const surface::SurfaceFacts> facts;
+  std::shared_ptr<const surface::SurfaceDescription> surface;  ///< at the time that is shown
+  std::shared_ptr<const surface::SurfaceFacts> facts;          ///< of it
+  std::shared_ptr<const surface::SurfaceFacts> first_facts;    ///< of the globe: tell when the tables change
+  SlotAges slots;
+  SlotAges::Stale stale;                                       ///< of the last frame
   /// Room for all that can be in flight, so that no worker ever waits on it.
   std::shared_ptr<FinishedQueue> finished;
   std::shared_ptr<GroundAnswer> ground = std::make_shared<GroundAnswer>();
@@ -167,6 +173,8 @@ struct GlobeView::State {
   void ask(const surface::TileRequest& request);
   bool submit(const geo::TileKey& key, Part part);
   void renew_roots();
+  void show_surface_at(const std::optional<UtcTime>& time);
+  void renew_colours();
   void resume_waiting();
   void order_waiting();
   void foresee(const view::Camera& camera, const ViewSettings& settings, Clock::time_point now);
@@ -180,11 +188,11 @@ struct GlobeView::State {
 };
 
 bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
-  return globe.try_submit([queue = finished, surface = globe.surface(), facts = facts, key, part,
+  return globe.try_submit([queue = finished, heights = globe.surface(), surface = surface, facts = facts, key, part,
                            token = stop.get_token()](SurfaceWorker& worker) {
-    Finished item{key, part, {}};
+    Finished item{key, part, surface->revision, {}};
     if (part == Part::geometry) {
-      auto geometry = worker.build_geometry(surface, *facts, key, token);
+      auto geometry = worker.build_geometry(heights, *facts, key, token);
       if (geometry) item.content = std::move(*geometry);
       else if (geometry.error().code == ErrorCode::pending) item.content = worker.take_awaited();
       else item.content = geometry.error();
@@ -207,6 +215,31 @@ void GlobeView::State::renew_roots() {
   }
 }
 
+/// From now on the layers show the steps of `time`; what was on its way for the old ones is let go.
+void GlobeView::State::show_surface_at(const std::optional<UtcTime>& time) {
+  auto latest = globe.surface_at(time);
+  if (latest == surface) return;
+  slots.layers_changed(*surface, *latest);
+  surface = std::move(latest);
+  std::erase_if(waiting, [&](const WaitingPart& part) {
+    if (part.part != Part::colour) return false;
+    tree.cancelled(part.key, part.part);
+    slots.not_asked(part.key);
+    return true;
+  });
+}
+
+/// Has the slots composed anew that are shown and hold what is over; they are shown until then.
+void GlobeView::State::renew_colours() {
+  stale = slots.find(selection->draw, Clock::now());
+  for (const geo::TileKey& key : stale.to_ask) {
+    if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting || !submit(key, Part::colour)) return;
+    slots.asked(key);
+    ++in_flight;
+    ++stats.requests;
+  }
+}
+
 /// Builds those whose data have come; drops those that no recent frame wanted. Roots are always wanted.
 void GlobeView::State::resume_waiting() {
   std::erase_if(waiting, [&](const WaitingPart& part) {
@@ -214,8 +247,10 @@ void GlobeView::State::resume_waiting() {
       ++in_flight;
       return true;
     }
-    if (part.key.level == 0 || tree.is_wanted(part.key, part.part)) return false;
+    const bool renews = part.part == Part::colour && slots.holds(part.key);
+    if (renews ? slots.is_wanted(part.key) : part.key.level == 0 || tree.is_wanted(part.key, part.part)) return false;
     tree.cancelled(part.key, part.part);
+    slots.not_asked(part.key);
     ++stats.requests_cancelled;
     return true;
   });
@@ -254,6 +289,7 @@ bool GlobeView::State::make_room(Part part) {
     if (const auto key = tree.eviction_candidate(p)) {
       renderer->release(thread, *key, p);
       tree.released(*key, p);
+      if (p == Part::colour) slots.released(*key);
       return true;
     }
   }
@@ -271,8 +307,14 @@ Result<void> GlobeView::State::upload(const Finished& item) {
 
 void GlobeView::State::take_over(Finished item) {
   --in_flight;
+  const bool renews = item.part == Part::colour && slots.holds(item.key);
+  const bool current = item.revision == surface->revision;
+  if (renews && !current) return slots.not_asked(item.key);  // the slot's own content is no older
   if (auto* awaited = std::get_if<source::Awaited>(&item.content)) {
-    if (awaited->empty() && item.key.level > 0) return tree.cancelled(item.key, item.part);  // another part has asked for them
+    if (awaited->empty() && (renews || item.key.level > 0)) {  // another part has asked for them
+      slots.not_asked(item.key);
+      return tree.cancelled(item.key, item.part);
+    }
     waiting.push_back(waiting_part(item.key, item.part, std::move(*awaited)));
     return;
   }
@@ -282,6 +324,7 @@ void GlobeView::State::take_over(Finished item) {
   else result = upload(item);
   if (!result) {
     const Error& error = result.error();
+    if (renews) slots.not_asked(item.key);
     if (error.code == ErrorCode::cancelled) return tree.cancelled(item.key, item.part);
     if (error.code == ErrorCode::exhausted) {
       // More is wanted than fits: want less from now on.
@@ -289,13 +332,16 @@ void GlobeView::State::take_over(Finished item) {
       return tree.cancelled(item.key, item.part);
     }
     const bool may_work_later = error.code == ErrorCode::unavailable;
-    return tree.failed(item.key, item.part, may_work_later ? Clock::now() + std::chrono::seconds(2) : Clock::time_point::max());
+    const auto retry_at = may_work_later ? Clock::now() + std::chrono::seconds(2) : Clock::time_point::max();
+    if (renews) slots.failed(item.key, retry_at);
+    return tree.failed(item.key, item.part, retry_at);
   }
   if (item.part == Part::geometry) {
     const auto& geometry = std::get<surface::TileGeometry>(item.content);
     tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
   } else {
     tree.arrived_colour(item.key);
+    slots.composed(item.key, current);
   }
 }
 
@@ -330,10 +376,14 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   resume_waiting();
   stats.upload_ms = ms_since(start);
 
-  if (auto latest = globe.facts(); latest != facts) {
+  show_surface_at(settings.time);
+  if (auto latest = globe.facts(); latest != first_facts) {
+    first_facts = std::move(latest);
+    roots_to_renew = geo::kFaceCount;
+  }
+  if (auto latest = globe.facts_of(surface); latest != facts) {
     facts = std::move(latest);
     tree.set_facts(facts);
-    roots_to_renew = geo::kFaceCount;
   }
   renew_roots();
   const auto before_select = Clock::now();
@@ -346,7 +396,8 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
     if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting) break;
     ask(request);
   }
-  if (selection->requests.empty()) {
+  renew_colours();
+  if (selection->requests.empty() && !stale.any) {
     for (const surface::TileRequest& request : ahead) {
       if (in_flight >= max_in_flight || waiting.size() >= kMostAhead) break;
       ask(request);
@@ -362,7 +413,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0;
+  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && !stale.any;
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
@@ -441,7 +492,7 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   state->max_bytes = std::max(gpu_budget_bytes / 4 * 3, kLeastBytes);
   state->max_in_flight = 4 * std::max(globe.worker_count(), 1);
   state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
-  state->facts = globe.facts();
+  state->facts = state->first_facts = globe.facts();
   if (auto roots = state->load_roots(); !roots) return roots.error();
   globe.begin_tables();
   return std::unique_ptr<GlobeView>(new GlobeView(std::move(state)));
@@ -474,8 +525,8 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;
-    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.selection->requests.empty() && !s.selection->stats.retries_later;
-    if (idle && s.facts == s.globe.facts()) return false;  // the rest has failed for good
+    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.selection->requests.empty() && !s.selection->stats.retries_later && !s.stale.may_change;
+    if (idle && s.first_facts == s.globe.facts()) return false;  // the rest has failed for good
     const auto now = Clock::now();
     if (now >= deadline) return false;
     s.wait_for_half(std::min(deadline, now + std::chrono::milliseconds(50)));

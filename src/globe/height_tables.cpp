@@ -12,7 +12,6 @@
 #include "base/log.h"
 #include "surface/error_scan.h"
 #include "surface/error_table.h"
-#include "surface/surface_facts_made.h"
 
 namespace tellurion::globe {
 struct HeightTables::State {
@@ -83,7 +82,7 @@ void HeightTables::State::finish() {
       std::filesystem::create_directories(file.parent_path(), failure);
       if (const auto saved = table->save(file, revision); !saved) log::warning(saved.error().message);
     }
-    publish(surface::make_facts(surface, std::move(table)));
+    publish(std::move(table));
   }
   ready = true;
 }
@@ -107,12 +106,12 @@ void HeightTables::load(bool scan) {
   State& s = *state_;
   if (!s.file.empty()) {
     if (auto kept = surface::ErrorTable::load(s.file, s.revision)) {
-      s.publish(surface::make_facts(s.surface, std::make_shared<const surface::ErrorTable>(std::move(*kept))));
+      s.publish(std::make_shared<const surface::ErrorTable>(std::move(*kept)));
       s.ready = true;
       return;
     }
   }
-  s.publish(surface::make_facts(s.surface, nullptr));
+  s.publish(nullptr);
   s.ready = !scan;
 }
 

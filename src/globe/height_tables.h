@@ -9,15 +9,15 @@
 #include "cache/block_cache.h"
 #include "globe/worker_pool.h"
 #include "surface/elevation_model.h"
-#include "surface/surface_facts.h"
+#include "surface/error_table.h"
 
 namespace tellurion::globe {
 
 class HeightTables {
  public:
-  using Publish = std::function<void(std::shared_ptr<const surface::SurfaceFacts>)>;
+  using Publish = std::function<void(std::shared_ptr<const surface::ErrorTable>)>;
 
-  /// `publish` gets facts at once (safe estimates, or those of a kept table) and again when the table is made, on any thread.
+  /// `publish` gets the table at once (null, or a kept one) and again when it is made, on any thread.
   /// `blocks` and `pool` outlive the jobs.
   HeightTables(std::shared_ptr<const surface::SurfaceDescription> surface, cache::BlockCache& blocks,
                std::filesystem::path cache_folder, WorkerPool& pool, Publish publish);

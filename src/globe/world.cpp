@@ -105,6 +105,7 @@ class WorldReader {
       fail(table, "the layer has no `source`");
     }
     const std::string& type = layer.source.type;
+    if (layer.source.time && layer.group == LayerGroup::height) fail(table, "heights have no `time`: only pictures change with it");
     if (is_drawn_by_itself(type) && layer.group == LayerGroup::height) fail(table, fmt::format("a source of type \"{}\" is a picture: its group is \"color\"", type));
     const std::string unnamed = !layer.source.url.empty() ? fetch::public_part(layer.source.url) : is_drawn_by_itself(type) ? type : layer.source.path.stem().string();
     layer.name = text(table, "name").value_or(unnamed);
@@ -124,9 +125,10 @@ class WorldReader {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
                   fmt::format("no source is of type \"{}\": it is gdal, image, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles, cog, tile-index or scale", source.type), ErrorCode::unsupported);
     }
-    expect_keys(table, "source", {"type", "path", image ? "bounds" : "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    expect_keys(table, "source", {"type", "path", "time", image ? "bounds" : "crs", "vertical", "no_data", "scale", "offset", "bands"});
     if (image) source.bounds = read_bounds(table, 360.0).value_or(std::array{-180.0, -90.0, 180.0, 90.0});
     read_path(table, source);
+    read_time(table, source.path.string(), source);
     read_samples(table, source);
   }
 
@@ -203,9 +205,10 @@ class WorldReader {
   }
 
   void read_tiles(const toml::table& table, SourceSpec& source) {
-    expect_keys(table, "source", {"type", "url", "subdomains", "headers", "projection", "encoding", "tile_size", "min_level", "max_level", "bounds", "vertical"});
+    expect_keys(table, "source", {"type", "url", "time", "subdomains", "headers", "projection", "encoding", "tile_size", "min_level", "max_level", "bounds", "vertical"});
     source.url = text(table, "url").value_or("");
     if (!is_web_address(source.url)) fail(table, "the source needs a `url` of http:// or https://, for example \"http://host/{z}/{x}/{y}.png\"");
+    read_time(table, source.url, source);
     source.vertical = text(table, "vertical");
     read_projection(table, source);
     read_encoding(table, source);
@@ -214,14 +217,7 @@ class WorldReader {
     source.max_level = static_cast<int>(number(table, "max_level", 0, 30).value_or(18));
     source.bounds = read_bounds(table);
     read_headers(table, source);
-    if (const toml::node* list = table.get("subdomains")) {
-      const toml::array* names = list->as_array();
-      if (!names) return fail(*list, "`subdomains` is a list of texts: [\"a\", \"b\"]");
-      for (const toml::node& name : *names) {
-        if (const auto value = name.value_exact<std::string>()) source.subdomains.push_back(*value);
-        else fail(name, "`subdomains` is a list of texts: [\"a\", \"b\"]");
-      }
-    }
+    if (const toml::node* list = table.get("subdomains")) read_texts(*list, "subdomains", source.subdomains);
   }
 
   void read_terrain(const toml::table& table, SourceSpec& source) {
@@ -293,6 +289,36 @@ class WorldReader {
     return std::nullopt;
   }
 
+  /// `place` is the path or URL.
+  void read_time(const toml::table& table, const std::string& place, SourceSpec& source) {
+    const toml::node* time = table.get("time");
+    if (!time) {
+      if (source.type == "xyz" && source::has_time(place)) fail(table, "the `url` has {time}: say which times there are, for example time = { values = [\"2019\", \"2020\"], format = \"%Y\" }");
+      return;
+    }
+    const toml::table* fields = time->as_table();
+    if (!fields) return fail(*time, "`time` is a table: time = { start = \"2020-01-01\", end = \"2020-12-31\", step = \"P1D\", format = \"%Y-%m-%d\" }");
+    expect_keys(*fields, "time", {"format", "values", "start", "end", "step"});
+    source::TimeSpec spec;
+    spec.format = text(*fields, "format").value_or(spec.format);
+    spec.start = text(*fields, "start").value_or("");
+    spec.end = text(*fields, "end").value_or("");
+    spec.step = text(*fields, "step").value_or("");
+    if (const toml::node* values = fields->get("values")) read_texts(*values, "values", spec.values);
+    if (!source::has_time(place)) fail(*time, "a source with a `time` has {time} in its path or URL, where the time goes");
+    if (const auto steps = source::TimeSteps::create(spec); !steps) fail(*time, steps.error().message);
+    source.time = std::move(spec);
+  }
+
+  void read_texts(const toml::node& node, std::string_view key, std::vector<std::string>& texts) {
+    const toml::array* list = node.as_array();
+    if (!list) return fail(node, fmt::format("`{}` is a list of texts: [\"a\", \"b\"]", key));
+    for (const toml::node& item : *list) {
+      if (const auto value = item.value_exact<std::string>()) texts.push_back(*value);
+      else fail(item, fmt::format("`{}` is a list of texts: [\"a\", \"b\"]", key));
+    }
+  }
+
   void read_drawn(const toml::table& table, SourceSpec& source) {
     if (source.type == "scale") {
       expect_keys(table, "source", {"type", "unit"});
@@ -355,6 +381,24 @@ class WorldReader {
   std::string name_;
   std::optional<Error> error_;
 };
+
+toml::array array_of(const std::vector<std::string>& texts) {
+  toml::array list;
+  for (const std::string& text : texts) list.push_back(text);
+  return list;
+}
+
+void insert_time(toml::table& table, const SourceSpec& source) {
+  if (!source.time) return;
+  toml::table fields;
+  fields.is_inline(true);
+  fields.insert("format", source.time->format);
+  if (!source.time->values.empty()) fields.insert("values", array_of(source.time->values));
+  if (!source.time->start.empty()) fields.insert("start", source.time->start);
+  if (!source.time->end.empty()) fields.insert("end", source.time->end);
+  if (!source.time->step.empty()) fields.insert("step", source.time->step);
+  table.insert("time", std::move(fields));
+}
 
 toml::array edges_array(const std::array<double, 4>& edges) {
   toml::array list;
@@ -423,11 +467,8 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
     const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
     table.insert("path", (inside ? relative : source.path).generic_string());
   }
-  if (!source.subdomains.empty()) {
-    toml::array names;
-    for (const std::string& name : source.subdomains) names.push_back(name);
-    table.insert("subdomains", std::move(names));
-  }
+  insert_time(table, source);
+  if (!source.subdomains.empty()) table.insert("subdomains", array_of(source.subdomains));
   if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
   if (!source.table.empty()) table.insert("table", source.table);
   if (source.projection != usual.projection) table.insert("projection", source.projection);
@@ -435,9 +476,7 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
   if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
   if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
-  if (source.bounds) {
-    table.insert("bounds", edges_array(*source.bounds));
-  }
+  if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
   if (source.crs) table.insert("crs", *source.crs);
   if (source.vertical) table.insert("vertical", *source.vertical);
   if (source.no_data) table.insert("no_data", *source.no_data);

@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "geo/ellipsoid.h"
+#include "source/temporal/time_steps.h"
 
 namespace tellurion::globe {
 
@@ -47,6 +48,7 @@ struct SourceSpec {
   std::optional<double> offset;
   std::optional<std::array<int, 3>> bands;  ///< red, green, blue; 1-based
 
+  std::optional<source::TimeSpec> time;     ///< of {time} in `path` or `url`
   std::string unit = "km";                  ///< of type "scale": or "m"
 
   // Of sources on servers ("xyz", "cesium-terrain", "cog", "pmtiles", some of "tile-index"); there `path` is empty.

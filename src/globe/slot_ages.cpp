@@ -1,0 +1,68 @@
+#include "globe/slot_ages.h"
+
+#include <algorithm>
+
+namespace tellurion::globe {
+namespace {
+
+constexpr std::uint64_t kFramesWanted = 3;  ///< a slot out of sight for longer is not waited for
+
+using Layers = std::vector<surface::Layer>;
+
+/// The layers of `some` whose source `others` lack.
+std::vector<const surface::Layer*> only_in(const Layers& some, const Layers& others) {
+  std::vector<const surface::Layer*> found;
+  for (const surface::Layer& layer : some) {
+    const auto same = [&](const surface::Layer& other) { return other.source_id == layer.source_id && other.source == layer.source; };
+    if (std::ranges::none_of(others, same)) found.push_back(&layer);
+  }
+  return found;
+}
+
+}  // namespace
+
+void SlotAges::layers_changed(const surface::SurfaceDescription& before, const surface::SurfaceDescription& now) {
+  std::vector<const surface::Layer*> changed = only_in(before.colours, now.colours);
+  const std::vector<const surface::Layer*> come = only_in(now.colours, before.colours);
+  changed.insert(changed.end(), come.begin(), come.end());
+  for (auto& [key, slot] : slots_) {
+    if (std::ranges::any_of(changed, [&](const surface::Layer* layer) { return layer->source->coverage().touches(key); })) slot.stale = true;
+    slot.retry_at = {};
+  }
+}
+
+SlotAges::Stale SlotAges::find(std::span<const surface::DrawTile> drawn, TimePoint now) {
+  ++frame_;
+  Stale stale;
+  for (const surface::DrawTile& tile : drawn) {
+    for (const geo::TileKey& owner : {tile.colour_owner, tile.colour_before}) {
+      const auto found = slots_.find(owner);
+      if (found == slots_.end() || !found->second.stale) continue;
+      Slot& slot = found->second;
+      stale.any = true;
+      stale.may_change = stale.may_change || slot.retry_at != TimePoint::max();
+      if (slot.shown == frame_) continue;
+      slot.shown = frame_;
+      if (!slot.asked && slot.retry_at <= now) stale.to_ask.push_back(owner);
+    }
+  }
+  return stale;
+}
+
+void SlotAges::failed(const geo::TileKey& key, TimePoint retry_at) {
+  const auto found = slots_.find(key);
+  if (found == slots_.end()) return;
+  found->second.asked = false;
+  found->second.retry_at = retry_at;
+}
+
+bool SlotAges::is_wanted(const geo::TileKey& key) const {
+  const auto found = slots_.find(key);
+  return found != slots_.end() && found->second.stale && found->second.shown > 0 && found->second.shown + kFramesWanted > frame_;
+}
+
+void SlotAges::set_asked(const geo::TileKey& key, bool on) {
+  if (const auto found = slots_.find(key); found != slots_.end()) found->second.asked = on;
+}
+
+}  // namespace tellurion::globe

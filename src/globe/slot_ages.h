@@ -1,0 +1,56 @@
+// Which colour slots show what their layers held before a time step changed, and are to be composed anew.
+// Lives on the render thread.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "geo/tile_key.h"
+#include "surface/draw_list.h"
+#include "surface/elevation_model.h"
+
+namespace tellurion::globe {
+
+class SlotAges {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  bool holds(const geo::TileKey& key) const { return slots_.contains(key); }
+  /// A slot was composed; `current`: of the layers as they are now.
+  void composed(const geo::TileKey& key, bool current) { slots_[key] = Slot{!current}; }
+  void released(const geo::TileKey& key) { slots_.erase(key); }
+
+  /// Slots that a layer touches whose source has changed show old data from now on.
+  void layers_changed(const surface::SurfaceDescription& before, const surface::SurfaceDescription& now);
+
+  struct Stale {
+    std::vector<geo::TileKey> to_ask;  ///< not asked for yet, or to be asked for again
+    bool any = false;                  ///< the drawn tiles show some old slot
+    bool may_change = false;           ///< of which some have not failed for good
+  };
+  /// Of the slots that `drawn` shows. Call once a frame.
+  Stale find(std::span<const surface::DrawTile> drawn, TimePoint now);
+
+  void asked(const geo::TileKey& key) { set_asked(key, true); }
+  void not_asked(const geo::TileKey& key) { set_asked(key, false); }
+  void failed(const geo::TileKey& key, TimePoint retry_at);
+  /// Whether the slot is old and one of the last frames showed it.
+  bool is_wanted(const geo::TileKey& key) const;
+
+ private:
+  struct Slot {
+    bool stale = false;
+    bool asked = false;
+    std::uint64_t shown = 0;  ///< frame that showed it stale last
+    TimePoint retry_at{};
+  };
+  void set_asked(const geo::TileKey& key, bool on);
+
+  std::map<geo::TileKey, Slot> slots_;
+  std::uint64_t frame_ = 0;
+};
+
+}  // namespace tellurion::globe

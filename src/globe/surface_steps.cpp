@@ -1,0 +1,110 @@
+#include "globe/surface_steps.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/log.h"
+
+namespace tellurion::globe {
+namespace {
+
+/// The layer as if it had but this one step.
+LayerSpec spec_of_step(const LayerSpec& layer, const std::string& time) {
+  LayerSpec spec = layer;
+  spec.source.time.reset();
+  spec.source.path = source::with_time(layer.source.path.string(), time);
+  spec.source.url = source::with_time(layer.source.url, time);
+  return spec;
+}
+
+}  // namespace
+
+SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open)
+    : ellipsoid_(ellipsoid), open_(std::move(open)), next_id_(static_cast<std::uint32_t>(layers.size())) {
+  for (const LayerInfo& info : layers) {
+    OneLayer layer{info.spec, info.raster, {}};
+    if (info.spec.source.time && info.spec.enabled) {
+      if (auto times = source::TimeSteps::create(*info.spec.source.time)) layer.timed = TimedLayer{std::move(*times), {}, {}, {}};
+    }
+    order_.push_back(layers_.size());
+    layers_.push_back(std::move(layer));
+  }
+  // Groups draw in their order, whatever the file's.
+  std::ranges::stable_sort(order_, {}, [&](std::size_t i) { return layers_[i].spec.group; });
+}
+
+SurfaceSteps::Steps SurfaceSteps::steps_at(const std::optional<UtcTime>& time) const {
+  Steps steps;
+  for (const OneLayer& layer : layers_) steps.push_back(layer.timed ? layer.timed->times.step_at(time) : 0);
+  return steps;
+}
+
+SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step) {
+  TimedLayer& timed = *layer.timed;
+  const auto held = std::ranges::find(timed.open, step, [](const auto& entry) { return entry.first; });
+  if (held != timed.open.end()) {
+    timed.open.splice(timed.open.begin(), timed.open, held);
+    return held->second;
+  }
+  Source source;
+  if (auto opened = open_(spec_of_step(layer.spec, timed.times.text(step)))) {
+    source = std::move(*opened);
+  } else {
+    if (timed.failures.count++ == 0) log::warning(opened.error().message);
+    timed.failures.last_error = opened.error().message;
+  }
+  if (timed.ids.emplace(step, next_id_).second) ++next_id_;
+  timed.open.emplace_front(step, source);
+  if (timed.open.size() > kHeldSources) timed.open.pop_back();
+  return source;
+}
+
+std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::optional<UtcTime>& time) {
+  std::lock_guard lock(mutex_);
+  Steps steps = steps_at(time);
+  const auto held = std::ranges::find(surfaces_, steps, [](const auto& entry) { return entry.first; });
+  if (held != surfaces_.end()) {
+    surfaces_.splice(surfaces_.begin(), surfaces_, held);
+    return held->second;
+  }
+  auto description = std::make_shared<surface::SurfaceDescription>();
+  description->ellipsoid = ellipsoid_;
+  description->revision = ++last_revision_;
+  for (const std::size_t i : order_) {
+    OneLayer& one = layers_[i];
+    surface::Layer layer;
+    layer.source = one.timed ? source_of(one, steps[i]) : one.fixed;
+    if (!layer.source) continue;
+    layer.name = one.spec.name;
+    layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : static_cast<std::uint32_t>(i);
+    layer.opacity = static_cast<float>(one.spec.opacity);
+    layer.gamma = static_cast<float>(one.spec.gamma);
+    layer.multiplier = static_cast<float>(one.spec.multiplier);
+    layer.adds = one.spec.adds;
+    (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
+  }
+  surfaces_.emplace_front(std::move(steps), description);
+  if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
+  return description;
+}
+
+std::string SurfaceSteps::text_of(std::size_t layer, const std::optional<UtcTime>& time) const {
+  const auto& timed = layers_[layer].timed;
+  return timed ? timed->times.text(timed->times.step_at(time)) : std::string();
+}
+
+std::vector<std::uint32_t> SurfaceSteps::source_ids(std::size_t layer) const {
+  std::vector<std::uint32_t> ids{static_cast<std::uint32_t>(layer)};
+  std::lock_guard lock(mutex_);
+  if (const auto& timed = layers_[layer].timed) {
+    for (const auto& [step, id] : timed->ids) ids.push_back(id);
+  }
+  return ids;
+}
+
+SurfaceSteps::Failures SurfaceSteps::failures_of(std::size_t layer) const {
+  std::lock_guard lock(mutex_);
+  return layers_[layer].timed ? layers_[layer].timed->failures : Failures{};
+}
+
+}  // namespace tellurion::globe

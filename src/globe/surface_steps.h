@@ -1,0 +1,79 @@
+// What the surface is made of at a moment: of layers with times the source of the step that holds then.
+// Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.h"
+#include "base/time.h"
+#include "globe/globe.h"
+#include "source/temporal/time_steps.h"
+#include "surface/elevation_model.h"
+
+namespace tellurion::globe {
+
+class SurfaceSteps {
+ public:
+  using OpenSource = std::function<Result<std::unique_ptr<source::RasterSource>>(const LayerSpec&)>;
+
+  /// Layers without times are those of `layers` that have a raster. Sources of steps are opened by `open` when first asked for;
+  /// at most kHeldSources of a layer stay open.
+  SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open);
+
+  /// The surface at `time`; without one the last step of each layer. A layer whose source cannot be opened is left out.
+  /// The same object for the same steps, as long as it is among the last few that were asked for.
+  std::shared_ptr<const surface::SurfaceDescription> at(const std::optional<UtcTime>& time);
+
+  /// How the step of a layer is written; empty if it has no times.
+  std::string text_of(std::size_t layer, const std::optional<UtcTime>& time) const;
+  /// All of a layer's numbers in the block cache.
+  std::vector<std::uint32_t> source_ids(std::size_t layer) const;
+  /// Steps that could not be opened, and why not the last of them.
+  struct Failures {
+    std::int64_t count = 0;
+    std::string last_error;
+  };
+  Failures failures_of(std::size_t layer) const;
+
+  static constexpr std::size_t kHeldSources = 8;
+  static constexpr std::size_t kHeldSurfaces = 4;
+
+ private:
+  using Source = std::shared_ptr<const source::RasterSource>;
+  struct TimedLayer {
+    source::TimeSteps times;
+    std::map<std::int64_t, std::uint32_t> ids;            ///< of steps that were opened
+    std::list<std::pair<std::int64_t, Source>> open;      ///< the most recently used first; null: cannot be opened
+    Failures failures;
+  };
+  struct OneLayer {
+    LayerSpec spec;
+    Source fixed;                     ///< null: it has times, or nothing is drawn of it
+    std::optional<TimedLayer> timed;
+  };
+  using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
+
+  Steps steps_at(const std::optional<UtcTime>& time) const;
+  Source source_of(OneLayer& layer, std::int64_t step);
+
+  geo::Ellipsoid ellipsoid_;
+  OpenSource open_;
+  std::vector<OneLayer> layers_;
+  std::vector<std::size_t> order_;  ///< in which they are drawn
+
+  mutable std::mutex mutex_;        ///< guards what follows, and the timed layers
+  std::uint32_t next_id_ = 0;
+  std::uint64_t last_revision_ = 0;
+  std::list<std::pair<Steps, std::shared_ptr<const surface::SurfaceDescription>>> surfaces_;  ///< the most recently used first
+};
+
+}  // namespace tellurion::globe

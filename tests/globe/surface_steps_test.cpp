@@ -1,0 +1,106 @@
+#include "globe/surface_steps.h"
+
+#include <doctest/doctest.h>
+
+#include "globe/slot_ages.h"
+#include "source/debug/tile_index.h"
+
+using namespace tellurion;
+using namespace tellurion::globe;
+
+namespace {
+
+UtcTime utc(const char* text) { return parse_utc(text).value(); }
+
+/// A layer of the years 2000, 2010 and 2020 over one without times; says which paths were opened, and cannot open 2010.
+struct Steps {
+  std::vector<std::string> opened;
+  SurfaceSteps steps;
+
+  static LayerInfo fixed() {
+    LayerInfo layer;
+    layer.spec.name = "fixed";
+    layer.raster = std::move(source::open_tile_index({}, geo::kWgs84)).value();
+    return layer;
+  }
+  static LayerInfo timed() {
+    LayerInfo layer;
+    layer.spec.name = "timed";
+    layer.spec.source.path = "/data/{time}.tif";
+    layer.spec.source.time = source::TimeSpec{"%Y", {"2000", "2010", "2020"}, "", "", ""};
+    return layer;
+  }
+
+  Steps() : steps(geo::kWgs84, {timed(), fixed()}, [this](const LayerSpec& spec) -> Result<std::unique_ptr<source::RasterSource>> {
+    opened.push_back(spec.source.path.string());
+    if (opened.back() == "/data/2010.tif") return Error{ErrorCode::not_found, "/data/2010.tif: there is no such file"};
+    return source::open_tile_index({true, 256}, geo::kWgs84);
+  }) {}
+};
+
+}  // namespace
+
+TEST_CASE("SurfaceSteps: the step that holds is shown, and opened once") {
+  Steps made;
+  const auto first = made.steps.at(utc("1990-01-01"));
+  REQUIRE(first->colours.size() == 2);
+  CHECK(first->colours[0].name == "timed");
+  CHECK(made.opened == std::vector<std::string>{"/data/2000.tif"});
+  CHECK(made.steps.at(utc("2009-12-31T23:59:59Z")) == first);
+  const auto last = made.steps.at(utc("2020-01-01"));
+  CHECK(last != first);
+  CHECK(last->revision != first->revision);
+  CHECK(last->colours[0].source_id != first->colours[0].source_id);
+  CHECK(last->colours[0].source != first->colours[0].source);
+  CHECK(last->colours[1].source == first->colours[1].source);
+  CHECK(last->colours[1].source_id == first->colours[1].source_id);
+  CHECK(made.steps.at(std::nullopt) == last);
+  CHECK(made.steps.at(utc("2001-01-01")) == first);
+  CHECK(made.opened.size() == 2);
+  CHECK(made.steps.text_of(0, utc("2001-01-01")) == "2000");
+  CHECK(made.steps.text_of(1, utc("2001-01-01")).empty());
+}
+
+TEST_CASE("SurfaceSteps: a step that cannot be opened is left out and told of") {
+  Steps made;
+  CHECK(made.steps.failures_of(0).count == 0);
+  const auto without = made.steps.at(utc("2015-01-01"));
+  REQUIRE(without->colours.size() == 1);
+  CHECK(without->colours[0].name == "fixed");
+  CHECK(made.steps.failures_of(0).count == 1);
+  CHECK(made.steps.failures_of(0).last_error == "/data/2010.tif: there is no such file");
+  CHECK(made.steps.at(utc("2021-01-01"))->colours.size() == 2);
+}
+
+TEST_CASE("SlotAges: slots that a changed layer touches are composed anew, once, as long as they are shown") {
+  Steps made;
+  const auto before = made.steps.at(utc("2000-01-01")), now = made.steps.at(utc("2020-01-01"));
+  const geo::TileKey root{0, 0, 0, 0}, other{1, 0, 0, 0};
+  const std::vector<surface::DrawTile> drawn{{.key = root, .colour_owner = root, .colour_before = root, .slope_owner = root}};
+  const SlotAges::TimePoint start{};
+  SlotAges slots;
+  slots.composed(root, true);
+  slots.composed(other, true);
+  CHECK_FALSE(slots.find(drawn, start).any);
+  slots.layers_changed(*before, *before);
+  CHECK_FALSE(slots.find(drawn, start).any);
+  slots.layers_changed(*before, *now);
+  CHECK(slots.find(drawn, start).to_ask == std::vector{root});
+  slots.asked(root);
+  SlotAges::Stale stale = slots.find(drawn, start);
+  CHECK(stale.any);
+  CHECK(stale.to_ask.empty());
+  CHECK(slots.is_wanted(root));
+  CHECK_FALSE(slots.is_wanted(other));
+  slots.failed(root, start + std::chrono::seconds(2));
+  CHECK(slots.find(drawn, start + std::chrono::seconds(1)).to_ask.empty());
+  CHECK(slots.find(drawn, start + std::chrono::seconds(3)).to_ask == std::vector{root});
+  slots.failed(root, SlotAges::TimePoint::max());
+  stale = slots.find(drawn, start + std::chrono::hours(1));
+  CHECK(stale.any);
+  CHECK_FALSE(stale.may_change);
+  slots.composed(root, true);
+  CHECK_FALSE(slots.find(drawn, start).any);
+  for (int frame = 0; frame < 5; ++frame) slots.find({}, start);
+  CHECK_FALSE(slots.is_wanted(root));
+}
