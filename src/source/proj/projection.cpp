@@ -198,7 +198,7 @@ Projection::~Projection() = default;
 
 std::string geographic_crs(const geo::Ellipsoid& world) {
   const bool on_earth = std::abs(world.a() / geo::kWgs84.a() - 1.0) <= 0.01;
-  return on_earth ? "OGC:CRS84" : fmt::format("+proj=longlat +a={:.3f} +b={:.3f} +no_defs", world.a(), world.b());
+  return on_earth ? "OGC:CRS84" : fmt::format("+proj=longlat +a={:.3f} +b={:.3f} +no_defs +type=crs", world.a(), world.b());
 }
 
 Result<Projection> Projection::create(const std::string& crs, const geo::Ellipsoid& world, glm::dvec2 centre) {

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "source/proj/projection.h"
+
 namespace tellurion::source {
 namespace {
 
@@ -34,9 +36,7 @@ Result<TileGrid> web_mercator_grid(int tile_size, int min_zoom, int max_zoom) {
 }
 
 Result<TileGrid> geographic_grid(int tile_size, int min_zoom, int max_zoom, const geo::Ellipsoid& world) {
-  // A planetary body's longitudes and latitudes go by its own radii.
-  std::string crs = is_earth(world) ? "OGC:CRS84" : fmt::format("+proj=longlat +a={:.3f} +b={:.3f} +no_defs", world.a(), world.b());
-  return halving_grid(std::move(crs), 2, {-180.0, 90.0}, 360.0, tile_size, min_zoom, max_zoom);
+  return halving_grid(geographic_crs(world), 2, {-180.0, 90.0}, 360.0, tile_size, min_zoom, max_zoom);
 }
 
 LevelTransform transform_between(const TileLevel& from, const TileLevel& to) {
