@@ -30,6 +30,13 @@ std::string text_of_place(const geo::LatLon& place) {
                      std::abs(longitude), longitude < 0 ? 'W' : 'E');
 }
 
+double Rate::of(double figure, std::chrono::steady_clock::time_point now) {
+  while (!looks_.empty() && now - looks_.front().when > std::chrono::seconds(2)) looks_.pop_front();
+  if (looks_.empty() || now - looks_.back().when >= std::chrono::milliseconds(50)) looks_.push_back({now, figure});
+  const double seconds = std::chrono::duration<double>(now - looks_.front().when).count();
+  return seconds > 0.0 ? (figure - looks_.front().figure) / seconds : 0.0;
+}
+
 void table_row(const char* name, const std::string& value) {
   ImGui::TableNextRow();
   ImGui::TableNextColumn();

@@ -1,6 +1,8 @@
 // Small parts that several panels are made of.
 #pragma once
 
+#include <chrono>
+#include <deque>
 #include <string>
 
 #include "globe/api.h"
@@ -13,6 +15,20 @@ std::string text_of_bytes(double bytes);
 std::string text_of_metres(double metres);
 /// "46.5000 N  8.0000 E".
 std::string text_of_place(const geo::LatLon& place);
+
+/// How fast a figure grows, over the last two seconds. For figures that are looked at now and then.
+class Rate {
+ public:
+  /// Takes the figure as it is now; gives its growth a second.
+  double of(double figure, std::chrono::steady_clock::time_point now);
+
+ private:
+  struct Look {
+    std::chrono::steady_clock::time_point when;
+    double figure;
+  };
+  std::deque<Look> looks_;  ///< at most a few dozen: no more than one in 50 ms is kept
+};
 
 /// A row of a table of two columns: a name and, right-aligned, a value.
 void table_row(const char* name, const std::string& value);

@@ -5,8 +5,11 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "viewer/panel_kit.h"
 #include "viewer/window.h"
@@ -78,13 +81,19 @@ void switch_button(const char* label, const char* tip, bool& on) {
   ImGui::SameLine();
 }
 
-/// The layers' names, for whom the data are owed to.
-std::string attribution(const globe::World& world) {
+/// Whom the data are owed to: a line for each source that says so, then the other layers' names.
+std::vector<std::string> attributions(const globe::Globe& globe) {
+  std::vector<std::string> lines;
   std::string names;
-  for (const auto& layer : world.layers) {
-    if (layer.enabled) names += (names.empty() ? "" : " \xC2\xB7 ") + layer.name;
+  for (const globe::LayerInfo& layer : globe.layers()) {
+    if (!layer.spec.enabled) continue;
+    std::string credit = layer.spec.attribution;
+    if (credit.empty() && layer.raster) credit = layer.raster->description().attribution;
+    if (credit.empty()) names += (names.empty() ? "" : " \xC2\xB7 ") + layer.spec.name;
+    else if (std::find(lines.begin(), lines.end(), credit) == lines.end()) lines.push_back(std::move(credit));
   }
-  return names;
+  if (!names.empty()) lines.push_back(std::move(names));
+  return lines;
 }
 
 std::string status_text(const globe::FrameStats& stats, const Moment& moment) {
@@ -138,8 +147,8 @@ std::optional<Command> Panels::draw(const globe::Globe& globe, const globe::Fram
   next_frame_ = (next_frame_ + 1) % kGraphFrames;
   std::optional<Command> command;
   toolbar(state, command);
-  if (state.shown.statistics) statistics(stats, state.shown.statistics);
-  if (state.shown.layers) layers(globe, state.shown.layers);
+  if (state.shown.statistics) statistics(globe, stats, state.shown.statistics);
+  if (state.shown.layers) layers(globe, state.view.time, state.shown.layers);
   if (state.shown.settings) settings(state);
   if (state.shown.help) help(state.shown.help);
   if (state.shown.hints) hints(globe, state.shown.hints);
@@ -229,7 +238,11 @@ void Panels::status_line(const globe::Globe& globe, const globe::FrameStats& sta
   ImGui::End();
   anchor(1.0f, 1.0f);
   ImGui::Begin("attribution", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
-  ImGui::TextDisabled("%s", attribution(globe.world()).c_str());
+  ImGui::PushTextWrapPos(0.6f * ImGui::GetIO().DisplaySize.x);
+  ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+  for (const std::string& line : attributions(globe)) ImGui::TextUnformatted(line.c_str());
+  ImGui::PopStyleColor();
+  ImGui::PopTextWrapPos();
   ImGui::End();
   ImGui::PopStyleVar();
 }

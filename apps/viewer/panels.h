@@ -6,6 +6,7 @@
 
 #include "globe/api.h"
 #include "viewer/bindings.h"
+#include "viewer/panel_kit.h"
 #include "viewer/viewer_state.h"
 
 namespace tellurion::apps {
@@ -32,8 +33,9 @@ class Panels {
 
  private:
   void toolbar(ViewerState& state, std::optional<Command>& command);
-  void statistics(const globe::FrameStats& stats, bool& shown);
-  void layers(const globe::Globe& globe, bool& shown);
+  void statistics(const globe::Globe& globe, const globe::FrameStats& stats, bool& shown);
+  void loader(const globe::Globe& globe);
+  void layers(const globe::Globe& globe, const std::optional<UtcTime>& time, bool& shown);
   void settings(ViewerState& state);
   void help(bool& shown);
   void hints(const globe::Globe& globe, bool& shown);
@@ -43,6 +45,7 @@ class Panels {
   static constexpr std::size_t kGraphFrames = 120;
   std::array<float, kGraphFrames> frame_ms_{};  ///< a ring
   std::size_t next_frame_ = 0;
+  Rate fetched_;  ///< bytes over the network
 };
 
 }  // namespace tellurion::apps

@@ -3,6 +3,8 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <chrono>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,7 @@ namespace {
 
 constexpr float kStatisticsWidth = 290.0f;
 constexpr float kLayersWidth = 420.0f;
+const ImVec4 kErrorColour{1.0f, 0.55f, 0.45f, 1.0f};
 
 /// "3:12 4:25": what there is of each level.
 std::string by_level(const std::vector<int>& counts) {
@@ -35,28 +38,28 @@ void raster_rows(const source::RasterDescription& raster) {
     table_row("vertical datum", raster.vertical_declared ? raster.vertical : raster.vertical + " (assumed)");
 }
 
-void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats* stats) {
-  const bool failed = !layer.error.empty() || (stats && stats->errors > 0);
-  if (failed) ImGui::PushStyleColor(ImGuiCol_Text, {1.0f, 0.55f, 0.45f, 1.0f});
+void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats& stats, const std::string& step) {
+  const bool failed = !layer.error.empty() || stats.errors > 0;
+  if (failed) ImGui::PushStyleColor(ImGuiCol_Text, kErrorColour);
   const std::string title =
       fmt::format("{} ({}){}", layer.spec.name, globe::name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
   const bool open = ImGui::CollapsingHeader(title.c_str(), ImGuiTreeNodeFlags_DefaultOpen);
   if (failed) ImGui::PopStyleColor();
   if (!open) return;
   ImGui::PushTextWrapPos(0.0f);
-  ImGui::TextDisabled("%s", layer.spec.source.path.string().c_str());
+  const std::string place = layer.raster ? layer.raster->description().name : layer.spec.source.path.string();
+  ImGui::TextWrapped("%s", place.c_str());
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingStretchProp)) {
+    if (!step.empty()) table_row("time", step);
     if (layer.raster) raster_rows(layer.raster->description());
-    if (stats)
-      table_row("read",
-                fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(stats->bytes)), stats->requests));
-    if (stats && stats->errors > 0) table_row("errors", std::to_string(stats->errors));
+    table_row("read", fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(stats.bytes)), stats.requests));
+    if (stats.errors > 0) table_row("errors", std::to_string(stats.errors));
     ImGui::EndTable();
   }
   if (!layer.error.empty())
     ImGui::TextWrapped("%s", layer.error.c_str());
-  else if (stats && !stats->last_error.empty())
-    ImGui::TextWrapped("%s", stats->last_error.c_str());
+  else if (!stats.last_error.empty())
+    ImGui::TextWrapped("%s", stats.last_error.c_str());
   if (layer.raster) {
     for (const std::string& hint : layer.raster->description().hints)
       ImGui::TextColored({1.0f, 0.80f, 0.40f, 1.0f}, "%s", hint.c_str());
@@ -66,7 +69,36 @@ void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats* stats)
 
 }  // namespace
 
-void Panels::statistics(const globe::FrameStats& s, bool& shown) {
+/// What the network brings, and what each of its sources did; nothing where no layer needs it.
+void Panels::loader(const globe::Globe& globe) {
+  const auto& layers = globe.layers();
+  const auto is_remote = [](const globe::LayerInfo& layer) { return layer.raster && layer.raster->description().is_remote; };
+  if (std::none_of(layers.begin(), layers.end(), is_remote)) return;
+  ImGui::Separator();
+  ImGui::TextDisabled("network");
+  const fetch::FetchStats fetched = globe.fetch_stats();
+  const double rate = fetched_.of(static_cast<double>(fetched.bytes), std::chrono::steady_clock::now());
+  if (ImGui::BeginTable("network", 2, ImGuiTableFlags_SizingStretchProp)) {
+    table_row("waiting, in flight", fmt::format("{}, {}", fetched.waiting, fetched.in_flight));
+    table_row("requests", std::to_string(fetched.started));
+    table_row("cancelled, failed", fmt::format("{}, {}", fetched.cancelled, fetched.failed));
+    table_row("bytes", fmt::format("{}, {}/s", text_of_bytes(static_cast<double>(fetched.bytes)), text_of_bytes(rate)));
+    ImGui::EndTable();
+  }
+  const auto stats = globe.source_stats();  // in the order of the layers
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    if (!is_remote(layers[i])) continue;
+    const globe::SourceStats& s = stats[i];
+    ImGui::TextWrapped("%s", s.name.c_str());
+    ImGui::TextDisabled("%s", fmt::format("  {} reads, {}, {} errors", s.requests, text_of_bytes(static_cast<double>(s.bytes)), s.errors).c_str());
+    if (s.last_error.empty()) continue;
+    ImGui::PushStyleColor(ImGuiCol_Text, kErrorColour);
+    ImGui::TextWrapped("%s", s.last_error.c_str());
+    ImGui::PopStyleColor();
+  }
+}
+
+void Panels::statistics(const globe::Globe& globe, const globe::FrameStats& s, bool& shown) {
   const ImVec2 display = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({display.x - 10.0f, 52.0f}, ImGuiCond_FirstUseEver, {1.0f, 0.0f});
   ImGui::SetNextWindowSize({kStatisticsWidth, 0.0f}, ImGuiCond_Always);
@@ -104,26 +136,22 @@ void Panels::statistics(const globe::FrameStats& s, bool& shown) {
     ImGui::Separator();
     ImGui::TextDisabled("drawn, level:tiles");
     ImGui::TextWrapped("%s", by_level(s.tiles_drawn_by_level).c_str());
+    loader(globe);
   }
   ImGui::End();
 }
 
-void Panels::layers(const globe::Globe& globe, bool& shown) {
+void Panels::layers(const globe::Globe& globe, const std::optional<UtcTime>& time, bool& shown) {
   const ImVec2 display = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({10.0f, 52.0f}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSize({kLayersWidth, std::min(520.0f, display.y - 110.0f)}, ImGuiCond_FirstUseEver);
   if (ImGui::Begin("Layers", &shown, ImGuiWindowFlags_NoCollapse)) {
-    const auto stats = globe.source_stats();
-    const auto stats_of = [&stats](const std::string& name) -> const globe::SourceStats* {
-      const auto found = std::find_if(stats.begin(), stats.end(), [&](const auto& s) { return s.name == name; });
-      return found == stats.end() ? nullptr : &*found;
-    };
+    const auto stats = globe.source_stats();  // in the order of the layers
     ImGui::TextUnformatted(globe.world().planet.c_str());
     if (!globe.world().file.empty()) ImGui::TextDisabled("%s", globe.world().file.string().c_str());
-    int number = 0;
-    for (const globe::LayerInfo& layer : globe.layers()) {
-      ImGui::PushID(number++);
-      layer_entry(layer, stats_of(layer.spec.name));
+    for (std::size_t i = 0; i < globe.layers().size(); ++i) {
+      ImGui::PushID(static_cast<int>(i));
+      layer_entry(globe.layers()[i], stats[i], globe.step_of(i, time));
       ImGui::PopID();
     }
   }

@@ -80,7 +80,7 @@ class WorldReader {
     LayerSpec layer;
     layer.line = line_of(table);
     expect_keys(table, "[[layer]]",
-                {"name", "group", "source", "opacity", "gamma", "multiplier", "enabled", "mode"});
+                {"name", "group", "source", "opacity", "gamma", "multiplier", "enabled", "mode", "attribution"});
     const auto group = text(table, "group");
     if (!group) {
       fail(table, "the layer has no `group`");
@@ -94,6 +94,7 @@ class WorldReader {
     layer.gamma = number(table, "gamma", 0.01, 100.0).value_or(1.0);
     layer.multiplier = number(table, "multiplier", -1e6, 1e6).value_or(1.0);
     layer.enabled = flag(table, "enabled").value_or(true);
+    layer.attribution = text(table, "attribution").value_or("");
     if (const auto mode = text(table, "mode")) {
       if (*mode == "add" && layer.group == LayerGroup::height) layer.adds = true;
       else if (*mode != "replace") fail(*table.get("mode"), "`mode` is \"replace\", or for height layers \"add\"");
@@ -537,6 +538,7 @@ std::string to_toml(const World& world) {
     if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
     if (!layer.enabled) table.insert("enabled", false);
     if (layer.adds) table.insert("mode", "add");
+    if (!layer.attribution.empty()) table.insert("attribution", layer.attribution);
     layers.push_back(std::move(table));
   }
   std::ostringstream out;

@@ -74,6 +74,7 @@ struct LayerSpec {
   double gamma = 1.0;
   double multiplier = 1.0;
   bool enabled = true;
+  std::string attribution;  ///< whom to credit; empty: whom the source itself names
   bool adds = false;   ///< height layers: added to the ones below instead of replacing them
   int line = 0;        ///< where it stands in the world file; 0 if it does not
 };
