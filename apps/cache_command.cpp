@@ -51,6 +51,7 @@ void add_cache(CLI::App& app, Run& run) {
   add("info", "how much there is", info);
   add("verify", "read all of it and drop what is damaged", verify);
   add("clear", "remove all of it", clear);
+  add_prefetch(*command, run);
 }
 
 }  // namespace tellurion::apps

@@ -16,6 +16,8 @@ void add_fly(CLI::App& app, Run& run);
 void add_height(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
 void add_cache(CLI::App& app, Run& run);
+/// Under `cache`.
+void add_prefetch(CLI::App& cache, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);
 

@@ -2,7 +2,6 @@
 #include "commands.h"
 
 #include <chrono>
-#include <cmath>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -13,17 +12,14 @@
 #include <malloc.h>
 #endif
 
-#include "options.h"
+#include "flight_frames.h"
 
 namespace tellurion::apps {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct FlyOptions : Options {
-  std::filesystem::path flight;
-  double frames_per_second = 30.0;
-  double clock_rate = 1.0;
+struct FlyOptions : FlightOptions {
   bool realtime = false;
 };
 
@@ -102,30 +98,23 @@ int fly(const FlyOptions& options) {
   globe::SummaryStats summary;
   std::string trace = globe::trace_header();
   bool complete = true;
-  const double duration = flight->end_s() - flight->start_s();
-  const int count = static_cast<int>(std::floor(duration * options.frames_per_second + 1e-9)) + 1;
+  const int count = frame_count(*flight, options);
   const auto start = Clock::now();
   for (int frame = 0; frame < count; ++frame) {
-    double elapsed = frame / options.frames_per_second;
+    const double elapsed = frame_seconds(frame, options);
     if (options.realtime) {
       // The flight's clock is the wall clock: slow frames are dropped, fast ones wait.
       const double now = std::chrono::duration<double>(Clock::now() - start).count();
       if (now > elapsed + 1.0 / options.frames_per_second && frame + 1 < count) continue;
       if (now < elapsed) std::this_thread::sleep_for(std::chrono::duration<double>(elapsed - now));
     }
-    const view::Pose pose = flight->pose_at(flight->start_s() + elapsed);
-    const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
-                                          to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
-    globe::ViewSettings settings = options.view;
+    const view::Camera camera = frame_camera(*flight, frame, options, (*globe)->ellipsoid());
+    globe::ViewSettings settings = frame_settings(frame, options);
     settings.transitions = options.realtime;
-    if (settings.time) {
-      *settings.time += std::chrono::duration_cast<std::chrono::milliseconds>(
-          std::chrono::duration<double>(elapsed * options.clock_rate));
-    }
     if (!options.realtime) {
       const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
       complete &= (*view)->finish(camera, settings, deadline);
-      ground.check(pose.position, options.view.exaggeration);  // may wait for data, which the picture has brought
+      ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // may wait for data, which the picture has brought
     }
     globe::FrameStats stats = (*view)->draw(camera, settings);
     stats.frame = frame;
@@ -164,10 +153,8 @@ void add_fly(CLI::App& app, Run& run) {
   command->add_option("WORLD FLIGHT", *words, "the world (default: the embedded Earth) and the flight: a CSV with the header "
                       "time,lat,lon,height,heading,pitch,roll")->required()->expected(1, 2)->type_name("");
   command->add_option("--out", options->out, "a folder for numbered PNGs, or a video")->required()->type_name("DIR|FILE.mp4");
-  command->add_option("--fps", options->frames_per_second, "frames a second (30)")->check(in_range(0.001, 1000.0))->type_name("N");
-  command->add_option("--clock-rate", options->clock_rate, "how fast the world's time runs (1)")->check(in_range(-1e6, 1e6))->type_name("R");
   command->add_flag("--realtime", options->realtime, "by the wall clock, finished or not");
-  command->add_option("--timeout", options->timeout_seconds, "for each frame to load (120)")->check(in_range(0.0, 1e6))->type_name("S");
+  add_flight_options(*command, *options);
   command->add_option("--stats", options->stats_file, "write the flight's figures")->type_name("FILE.json");
   command->add_option("--trace", options->trace_file, "write the figures of every frame")->type_name("FILE.csv");
   add_view_options(*command, *options);

@@ -9,6 +9,7 @@
 #include "globe/globe_view.h"
 #include "globe/kept_files.h"
 #include "globe/picture_file.h"
+#include "globe/prefetch.h"
 #include "globe/world.h"
 #include "source/raster_source.h"
 #include "view/camera.h"

@@ -231,11 +231,7 @@ void Globe::State::open_layers() {
   }
   steps = std::make_unique<SurfaceSteps>(world.ellipsoid, drawn, [this](const LayerSpec& spec) { return open_source(spec); });
   surface = steps->at(options.time);
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const std::vector<std::uint32_t> ids = steps->source_ids(i);
-    const auto shown = std::ranges::find_if(surface->colours, [&](const surface::Layer& l) { return std::ranges::find(ids, l.source_id) != ids.end(); });
-    if (shown != surface->colours.end()) layers[i].raster = shown->source;
-  }
+  for (std::size_t i = 0; i < layers.size(); ++i) layers[i].raster = steps->raster_at(i, options.time);
 }
 
 void Globe::State::take_table(std::shared_ptr<const surface::ErrorTable> found) {
@@ -266,6 +262,7 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
 const World& Globe::world() const { return state_->world; }
 const geo::Ellipsoid& Globe::ellipsoid() const { return state_->world.ellipsoid; }
 const std::vector<LayerInfo>& Globe::layers() const { return state_->layers; }
+std::shared_ptr<const source::RasterSource> Globe::raster_at(std::size_t layer, const std::optional<UtcTime>& time) const { return state_->steps->raster_at(layer, time); }
 std::string Globe::step_of(std::size_t layer, const std::optional<UtcTime>& time) const { return state_->steps->text_of(layer, time); }
 
 std::vector<std::string> Globe::hints() const {

@@ -89,6 +89,8 @@ class Globe {
   view::Pose home() const;
 
   const std::vector<LayerInfo>& layers() const;
+  /// A layer's raster at `time`; null as LayerInfo's.
+  std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time) const;
   /// What of a layer with times is shown at `time`, as its path or URL has it; empty for others.
   std::string step_of(std::size_t layer, const std::optional<UtcTime>& time) const;
 

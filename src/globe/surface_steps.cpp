@@ -88,6 +88,12 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
   return description;
 }
 
+std::shared_ptr<const source::RasterSource> SurfaceSteps::raster_at(std::size_t layer, const std::optional<UtcTime>& time) {
+  std::lock_guard lock(mutex_);
+  OneLayer& one = layers_[layer];
+  return one.timed ? source_of(one, one.timed->times.step_at(time)) : one.fixed;
+}
+
 std::string SurfaceSteps::text_of(std::size_t layer, const std::optional<UtcTime>& time) const {
   const auto& timed = layers_[layer].timed;
   return timed ? timed->times.text(timed->times.step_at(time)) : std::string();

@@ -33,6 +33,8 @@ class SurfaceSteps {
   /// The same object for the same steps, as long as it is among the last few that were asked for.
   std::shared_ptr<const surface::SurfaceDescription> at(const std::optional<UtcTime>& time);
 
+  /// A layer's source at `time`; null: it has none.
+  std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time);
   /// How the step of a layer is written; empty if it has no times.
   std::string text_of(std::size_t layer, const std::optional<UtcTime>& time) const;
   /// All of a layer's numbers in the block cache.

@@ -7,6 +7,7 @@ import unittest
 
 import numpy as np
 
+from _common import read_picture
 from tiles import NIGHT, TileServer
 from viewer import SIZE, WindowTest, run_on_display_in_memory
 
@@ -49,7 +50,7 @@ class Loader(WindowTest):
         def credits_width(more):
             """How far to the left the credits reach."""
             with TileServer() as server:
-                viewer = self.open(FAR, "--no-atmosphere", world=self.world(server, more))
+                viewer = self.open((30, 30, 40000000, 0, -90), "--no-atmosphere", world=self.world(server, more))
                 corner = self.whole_screen(viewer)[SIZE[1] - 36:SIZE[1] - 12, SIZE[0] // 3:]
                 viewer.close()
             # The panel's ground is a dark grey over a black sky.
@@ -62,7 +63,6 @@ class Loader(WindowTest):
 
     def whole_screen(self, viewer):
         viewer.screen("whole")
-        from _common import read_picture
         return read_picture(self.folder / "whole.png").astype(int)
 
 
