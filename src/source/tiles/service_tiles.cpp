@@ -49,7 +49,7 @@ class ServiceTiles final : public TileSupply {
     const std::string url = url_of_(tile);
     if (url.empty()) return fetch::File{};
     const auto refuse = [url](const std::string& bytes) { return refusal(url, bytes); };
-    fetch::Asked asked = store_->ask({url, headers_, key_of(tile), {}, wish.expected_bytes, refuse}, wish.gain);
+    fetch::Asked asked = store_->ask({url, headers_, key_of(tile), {}, wish.expected_bytes, {}, refuse}, wish.gain);
     const auto* file = std::get_if<fetch::File>(&asked);
     if (file && file->bytes && is_out_of_range(*file->bytes)) return fetch::File{};
     return asked;
