@@ -13,6 +13,7 @@
 #endif
 
 #include "flight_frames.h"
+#include "timed_frames.h"
 
 namespace tellurion::apps {
 namespace {
@@ -23,11 +24,12 @@ struct FlyOptions : FlightOptions {
   bool realtime = false;
 };
 
-/// Where a flight's pictures go: numbered PNGs in a folder, or one video.
+/// Where a flight's pictures go: numbered PNGs in a folder, one video, or nowhere.
 class PictureSink {
  public:
   static Result<PictureSink> open(const FlyOptions& options) {
     PictureSink sink;
+    if (options.out.empty()) return sink;
     if (options.out.extension() == ".mp4") {
       const auto folder = options.out.parent_path();
       if (!folder.empty() && !std::filesystem::is_directory(folder))
@@ -46,6 +48,8 @@ class PictureSink {
     sink.folder_ = options.out;
     return sink;
   }
+
+  bool takes_pictures() const { return video_ || !folder_.empty(); }
 
   Result<void> add(const raster::Image& image, int frame) {
     return video_ ? video_->add(image) : globe::write_png(folder_ / fmt::format("{:06}.png", frame), image);
@@ -95,6 +99,7 @@ int fly(const FlyOptions& options) {
   if (!sink) return report(sink.error());
 
   GroundWarning ground(**globe);
+  TimedFrames frames(**view);
   globe::SummaryStats summary;
   std::string trace = globe::trace_header();
   bool complete = true;
@@ -116,14 +121,16 @@ int fly(const FlyOptions& options) {
       complete &= (*view)->finish(camera, settings, deadline);
       ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // may wait for data, which the picture has brought
     }
-    globe::FrameStats stats = (*view)->draw(camera, settings);
+    globe::FrameStats stats = frames.draw(camera, settings);
     stats.frame = frame;
     stats.time = elapsed;
     stats.resident_bytes = globe::resident_bytes();
     summary.frame_ms.push_back(stats.frame_ms);
     summary.last = stats;
     if (!options.trace_file.empty()) trace += globe::trace_line(stats);
-    if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
+    if (sink->takes_pictures()) {
+      if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
+    }
     show_progress(frame + 1, count);
     give_memory_back();
   }
@@ -152,7 +159,7 @@ void add_fly(CLI::App& app, Run& run) {
   auto words = std::make_shared<std::vector<std::string>>();
   command->add_option("WORLD FLIGHT", *words, "the world (default: the embedded Earth) and the flight: a CSV with the header "
                       "time,lat,lon,height,heading,pitch,roll")->required()->expected(1, 2)->type_name("");
-  command->add_option("--out", options->out, "a folder for numbered PNGs, or a video")->required()->type_name("DIR|FILE.mp4");
+  command->add_option("--out", options->out, "a folder for numbered PNGs, or a video; may be left out if figures are written")->type_name("DIR|FILE.mp4");
   command->add_flag("--realtime", options->realtime, "by the wall clock, finished or not");
   add_flight_options(*command, *options);
   command->add_option("--stats", options->stats_file, "write the flight's figures")->type_name("FILE.json");
@@ -162,6 +169,8 @@ void add_fly(CLI::App& app, Run& run) {
   command->callback([options, words, &run] {
     options->flight = words->back();
     if (words->size() == 2) options->world = words->front();
+    if (options->out.empty() && options->stats_file.empty() && options->trace_file.empty())
+      throw CLI::RequiredError("--out, or --stats or --trace for the figures alone");
     run = [options] { return fly(*options); };
   });
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "options.h"
+#include "timed_frames.h"
 
 namespace tellurion::apps {
 namespace {
@@ -22,10 +23,10 @@ Clock::duration milliseconds(double ms) {
 }
 
 /// Draws the view for `ms`, loading as a viewer would.
-void draw_for(globe::GlobeView& view, const view::Camera& camera, const globe::ViewSettings& settings, double ms, std::string* trace) {
+void draw_for(TimedFrames& frames, const view::Camera& camera, const globe::ViewSettings& settings, double ms, std::string* trace) {
   const auto deadline = Clock::now() + milliseconds(ms);
   do {
-    const auto& stats = view.draw(camera, settings);
+    const globe::FrameStats stats = frames.draw(camera, settings);
     if (trace) *trace += globe::trace_line(stats);
   } while (Clock::now() < deadline);
 }
@@ -35,6 +36,7 @@ int render(const Options& options) {
   if (!thread) return report(thread.error());
   auto globe = open_globe(options, options.after_ms ? RenderThreadUse::draws : RenderThreadUse::waits);
   if (!globe) return report(globe.error());
+  const auto start = Clock::now();  // the view's coarsest tiles may come over a network
   auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
   if (!view) return report(view.error());
 
@@ -42,10 +44,10 @@ int render(const Options& options) {
   const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                         to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
   std::string trace = globe::trace_header();
-  const auto start = Clock::now();
+  TimedFrames frames(**view);
   bool complete = true;
   if (options.after_ms) {
-    draw_for(**view, camera, options.view, *options.after_ms, &trace);
+    draw_for(frames, camera, options.view, *options.after_ms, &trace);
   } else {
     complete = (*view)->finish(camera, options.view, start + milliseconds(options.timeout_seconds * 1e3));
   }
@@ -61,11 +63,10 @@ int render(const Options& options) {
   }
   if (!options.stats_file.empty() || !options.trace_file.empty()) {
     for (int i = 0; i < kTimedFrames; ++i) {
-      const auto& stats = (*view)->draw(camera, options.view);
-      summary.frame_ms.push_back(stats.frame_ms);
-      trace += globe::trace_line(stats);
+      summary.last = frames.draw(camera, options.view);
+      summary.frame_ms.push_back(summary.last.frame_ms);
+      trace += globe::trace_line(summary.last);
     }
-    summary.last = (*view)->stats();
     summary.last.resident_bytes = globe::resident_bytes();
     summary.sources = (*globe)->source_stats();
     if (!options.stats_file.empty()) {

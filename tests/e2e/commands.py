@@ -186,7 +186,7 @@ class Render(CommandCase):
                 self.refused("render", world, "--out", self.out, naming=f"wrong.toml:{line}")
 
     def test_wrong_usage(self):
-        for arguments in ([], ["no-such-command"], ["render"], ["render", "--out"], ["fly", "--out", self.folder / "x"],
+        for arguments in ([], ["no-such-command"], ["render"], ["render", "--out"], ["fly", "--out", self.folder / "x"], ["fly", self.folder / "flight.csv"],
                           ["height", self.earth, "extra"], ["bench", "no-such-benchmark"],
                           *(["render", "--out", self.out, *wrong] for wrong in WRONG_OPTIONS)):
             with self.subTest(arguments=arguments):
@@ -236,6 +236,16 @@ class Fly(CommandCase):
         self.tellurion("fly", self.earth, flight, "--out", out, "--fps", 10, *SMALL, "--realtime", "--clock-rate", 60,
                        "--time", "2024-06-20T10:00:00Z")
         self.assertTrue(3 <= len(list(out.glob("*.png"))) <= 21)
+
+    def test_a_flight_may_be_measured_without_pictures(self):
+        flight = self.flight("0,46,8,200000,0,-60,0", "1,46.5,8.5,150000,20,-50,0")
+        trace, before = self.folder / "alone.csv", set(self.folder.iterdir())
+        self.tellurion("fly", self.earth, flight, "--fps", 2, *SMALL, "--trace", trace)
+        self.assertEqual(set(self.folder.iterdir()) - before - {self.folder / "cache"}, {trace})
+        frames = read_trace(trace)
+        self.assertEqual(len(frames), 3)
+        for frame in frames:
+            self.assertGreaterEqual(frame["frame_ms"], frame["draw_ms"])
 
     def test_the_clock_rate_turns_the_sun(self):
         flight = self.flight("0,46,8,5000000,0,-90,0", "1,46,8,5000000,0,-90,0")
