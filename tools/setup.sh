@@ -10,7 +10,7 @@ usage: tools/setup.sh [--test] [--fuzz] [--bench] [--dry-run]
 Installs what is missing of the Debian 12 packages to build and run Tellurion.
   --test      also what the tests need (doctest, GeographicLib, Python, Xvfb, ...)
   --fuzz      also what the fuzzers need (clang with libFuzzer)
-  --bench     also what a benchmark compares with: Node.js and the npm package @mapbox/martini
+  --bench     also what benchmarks compare with: Node.js, Chromium and npm packages (martini, CesiumJS, MapLibre GL JS)
   --dry-run   only name the missing packages
 USAGE
 }
@@ -33,6 +33,7 @@ test_packages=(
   mapproxy nginx-light                                         # services and a server to ask
 )
 fuzz_packages=(clang libclang-rt-14-dev)
+bench_packages=(chromium python3 python3-numpy python3-pil)  # bench/compare: the browser, and what a tile server makes tiles with
 
 packages=("${build_packages[@]}")
 dry_run=false
@@ -41,7 +42,11 @@ while (($#)); do
   case $1 in
     --test) packages+=("${test_packages[@]}") ;;
     --fuzz) packages+=("${fuzz_packages[@]}") ;;
-    --bench) bench=true; command -v npm >/dev/null || packages+=(nodejs npm) ;;
+    --bench)
+      bench=true
+      packages+=("${bench_packages[@]}")
+      command -v npm >/dev/null || packages+=(nodejs npm)
+      ;;
     --dry-run) dry_run=true ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
@@ -62,11 +67,15 @@ for package in "${packages[@]}"; do
 done
 
 # npm packages, once the Debian packages are there.
-martini=$(dirname "${BASH_SOURCE[0]}")/../bench/martini
+bench_folder=$(dirname "${BASH_SOURCE[0]}")/../bench
 install_npm_packages() {
-  if $bench && ! [[ -d $martini/node_modules/@mapbox/martini ]]; then
-    npm ci --prefix "$martini" --no-audit --no-fund >&2
-  fi
+  $bench || return 0
+  local name
+  for name in martini compare; do
+    # npm writes this file when it has installed everything.
+    [[ -f $bench_folder/$name/node_modules/.package-lock.json ]] && continue
+    npm ci --prefix "$bench_folder/$name" --ignore-scripts --no-audit --no-fund >&2
+  done
 }
 
 ((${#missing[@]})) || { $dry_run || install_npm_packages; exit 0; }
