@@ -203,15 +203,16 @@ void add_prefetch(CLI::App& cache, Run& run) {
   auto options = std::make_shared<PrefetchOptions>();
   CLI::App* command = cache.add_subcommand("prefetch", "fetch the tiles of a region or a flight ahead, for --offline");
   add_world(*command, *options, true);
+  add_flight_options(*command, *options);
+  add_view_options(*command, *options);
+  add_resource_options(*command, *options);
+  command->remove_option(command->get_option("--bounds"));  // of tiles: nothing is drawn here, and the region has that name
   command->add_option_function<std::string>("--bounds", [options](const std::string& t) { set_bounds(t, *options); }, "the region, in degrees; west > east: across longitude 180")->type_name("W,S,E,N");
   command->add_option_function<std::string>("--levels", [options](const std::string& t) { set_levels(t, *options); }, "the levels: zooms, the coarsest and the finest")->type_name("A-B");
   command->add_option_function<double>("--resolution", [options](const double& metres) { options->area = {options->area.bounds, {0, 30}, metres, {}}; },
                                        "instead: every level down to this fineness, metres a pixel")->check(in_range(1e-3, 1e7))->type_name("M");
   command->add_option("--flight", options->flight, "instead of a region: what `fly` needs for this flight, with the same options")->type_name("FILE.csv");
   command->add_flag("--anyway", options->anyway, "even if the tiles will not fit into the disk cache");
-  add_flight_options(*command, *options);
-  add_view_options(*command, *options);
-  add_resource_options(*command, *options);
   command->callback([options, &run] {
     check(*options);
     options->area.time = options->view.time;
