@@ -14,7 +14,7 @@ namespace tellurion::source {
 namespace {
 
 constexpr int kGroupRows = 256;                ///< rows of low blocks (strips) that are asked for together
-constexpr std::uint64_t kJoinedGap = 4096;     ///< bytes between blocks of a group that are fetched along
+constexpr std::uint64_t kJoinedGap = 64;       ///< bytes between blocks of a group that are fetched along: their frames, no other block
 
 std::optional<std::uint64_t> number_of(GDALRasterBand& band, const char* what, int column, int row) {
   const char* text = band.GetMetadataItem(fmt::format("BLOCK_{}_{}_{}", what, column, row).c_str(), "TIFF");
