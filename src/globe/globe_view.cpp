@@ -21,6 +21,7 @@ using surface::Part;
 
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
+constexpr std::chrono::seconds kPause{2};  ///< before a part that failed is asked for again
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
@@ -161,6 +162,7 @@ struct GlobeView::State {
   std::vector<WaitingPart> waiting;
   int roots_to_renew = 0;   ///< whose geometry was built by older facts and has not been asked for again
   int roots_renewing = 0;
+  std::vector<std::pair<Clock::time_point, geo::TileKey>> roots_to_retry;  ///< whose heights failed: a bare ellipsoid stands in until then
   int max_in_flight = 0;
   std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
@@ -213,6 +215,12 @@ void GlobeView::State::renew_roots() {
     ++roots_renewing;
     ++in_flight;
   }
+  std::erase_if(roots_to_retry, [&](const auto& retry) {
+    if (Clock::now() < retry.first || !submit(retry.second, Part::geometry)) return false;
+    ++roots_renewing;
+    ++in_flight;
+    return true;
+  });
 }
 
 /// From now on the layers show the steps of `time`; what was on its way for the old ones is let go.
@@ -332,7 +340,8 @@ void GlobeView::State::take_over(Finished item) {
       return tree.cancelled(item.key, item.part);
     }
     const bool may_work_later = error.code == ErrorCode::unavailable;
-    const auto retry_at = may_work_later ? Clock::now() + std::chrono::seconds(2) : Clock::time_point::max();
+    if (may_work_later && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.emplace_back(Clock::now() + kPause, item.key);
+    const auto retry_at = may_work_later ? Clock::now() + kPause : Clock::time_point::max();
     if (renews) slots.failed(item.key, retry_at);
     return tree.failed(item.key, item.part, retry_at);
   }
@@ -413,7 +422,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && !stale.any;
+  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !stale.any;
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
@@ -463,6 +472,7 @@ Result<void> GlobeView::State::load_roots() {
       auto bare = build_bare(item->key);
       if (!bare) return bare.error();
       if (auto* awaited = std::get_if<source::Awaited>(&item->content)) late.push_back(waiting_part(item->key, item->part, std::move(*awaited)));
+      else if (std::get<Error>(item->content).code == ErrorCode::unavailable) roots_to_retry.emplace_back(Clock::now() + kPause, item->key);
       item->content = std::move(*bare);
     }
     take_over(std::move(*item));
@@ -525,7 +535,7 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;
-    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.selection->requests.empty() && !s.selection->stats.retries_later && !s.stale.may_change;
+    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.roots_to_retry.empty() && s.selection->requests.empty() && !s.selection->stats.retries_later && !s.stale.may_change;
     if (idle && s.first_facts == s.globe.facts()) return false;  // the rest has failed for good
     const auto now = Clock::now();
     if (now >= deadline) return false;
