@@ -29,7 +29,7 @@ class Loader(WindowTest):
         with TileServer() as server:
             viewer = self.open(FAR, world=self.world(server))
             viewer.key("F2")
-            good = viewer.screen("loader")
+            good = self.whole_screen(viewer)
             self.assertLess(share_of(good, error_red), 1e-4)
             self.assertGreater(viewer.figures()["bytes_fetched"], 0)
             viewer.close()
@@ -37,7 +37,8 @@ class Loader(WindowTest):
         with TileServer(lambda path, times: 403 if "/3/" in path else None) as server:
             viewer = self.open_unfinished(server)
             viewer.do("key", "F2", "sleep", "3", "mousemove", "480", "300", "click", "--repeat", "60", "--delay", "20", "5", "sleep", "1")
-            self.assertGreater(share_of(viewer.screen("refused"), error_red), 5e-4)
+            viewer.screen("refused")
+            self.assertGreater(share_of(self.whole_screen(viewer), error_red), 5e-4)
 
     def open_unfinished(self, server):
         """A view that never gets complete; the first frames are enough."""
