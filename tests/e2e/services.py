@@ -11,7 +11,7 @@ from _common import ROOT, Case, read_picture
 from _services import NIGHT, Answering, mapproxy, nginx, shared_files
 
 SAVED = ROOT / "tests/data/services"
-PLAIN = ("--no-atmosphere", "--no-lighting", "--size", "320x180", "--timeout", "600")
+PLAIN = ("--no-atmosphere", "--no-lighting", "--size", "480x270", "--timeout", "600")
 GLOBE = (20, 20, 9000000, 0, -90)
 EUROPE = (50, 10, 2500000, 0, -90)
 ARCTIC = (80, 30, 5000000, 0, -90)
