@@ -80,7 +80,7 @@ class Services(Case):
         for version in ("1.1.1", "1.3.0"):
             # EPSG:3035 has north before east.
             for crs in ("EPSG:25832", "EPSG:3035"):
-                self.check_same(f"wms-{version}-{crs[5:]}", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "{crs}", bounds = [-5, 40, 25, 60]', EUROPE, 6, 60)
+                self.check_same(f"wms-{version}-{crs[5:]}", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "{crs}", bounds = [-5, 40, 25, 60]', EUROPE, 6, 90)
         self.check_same("wms-arctic", f'type = "wms", url = "{self.base}/service", layers = "night", crs = "EPSG:3995", bounds = [-180, 50, 180, 86]', ARCTIC, 4, 50)
 
     def test_tms_of_a_service_and_of_a_folder(self):
