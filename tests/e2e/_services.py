@@ -1,7 +1,9 @@
 """Servers on loopback for services.py: the shared folder's files, MapProxy over them, nginx, and one that answers as it is told."""
+import functools
 import http.server
 import os
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
@@ -9,6 +11,9 @@ import sys
 import threading
 import time
 import urllib.request
+
+import numpy as np
+from osgeo import gdal, osr
 
 from _common import SHARED
 
@@ -25,6 +30,12 @@ layers:
   - name: night
     title: City lights
     sources: [night]
+  - name: arctic  # MapProxy does not reproject Mercator to where the pole is
+    title: City lights round the pole
+    sources: [night_arctic]
+  - name: night84  # MapProxy mistakes CRS:84 for EPSG:4326 where there are several grids
+    title: City lights, of one grid
+    sources: [night_mercator]
 caches:
   whole:  # MapProxy reprojects from caches only
     grids: [tiles]
@@ -32,11 +43,26 @@ caches:
     disable_storage: true
     format: image/png
   night:
-    grids: [mercator, geodetic, arctic]
+    grids: [mercator, geodetic]
     sources: [whole]
     disable_storage: true
     format: image/png
+  night_mercator:
+    grids: [mercator]
+    sources: [whole]
+    disable_storage: true
+    format: image/png
+  night_arctic:
+    grids: [arctic]
+    sources: [arctic_tiles]
+    disable_storage: true
+    format: image/png
 sources:
+  arctic_tiles:
+    type: tile
+    grid: arctic
+    url: {files}/arctic/%(z)s/%(x)s/%(y)s.png
+    transparent: true
   tiles:
     type: tile
     grid: tiles
@@ -104,8 +130,67 @@ class Answering:
         self.close()
 
 
+def web_mercator_night():
+    """The night tiles of level 4 in one raster."""
+    count, half = 16, 6378137.0 * np.pi
+    raster = gdal.GetDriverByName("MEM").Create("", 256 * count, 256 * count, 3)
+    for x in range(count):
+        for y in range(count):
+            tile = gdal.Open(str(SHARED / NIGHT / f"4/{x}/{count - 1 - y}.png")).ReadAsArray()[:3]
+            raster.WriteArray(tile, 256 * x, 256 * y)
+    side = 2 * half / raster.RasterXSize
+    raster.SetGeoTransform([-half, side, 0, half, 0, -side])
+    raster.SetSpatialRef(spatial_reference(3857))
+    return raster
+
+
+def spatial_reference(code):
+    reference = osr.SpatialReference()
+    reference.ImportFromEPSG(code)
+    return reference
+
+
+class ArcticTiles:
+    """The night as GDAL reprojects it to EPSG:3995, in tiles of 256 pixels: the picture for /arctic/z/x/y.png."""
+
+    def __init__(self):
+        half = 4500000.0
+        night = web_mercator_night()
+        self.levels = []
+        for level in range(5):
+            pixels = 256 << level
+            raster = gdal.Warp("", night, format="MEM", dstSRS="EPSG:3995", outputBounds=(-half, -half, half, half), width=pixels,
+                               height=pixels, resampleAlg="average" if level < 3 else "bilinear", dstAlpha=True)
+            self.levels.append(raster.ReadAsArray())
+
+    def picture(self, level, x, y):
+        tile = self.levels[level][:, 256 * y:256 * (y + 1), 256 * x:256 * (x + 1)]
+        file = f"/vsimem/arctic-{threading.get_ident()}.png"
+        raster = gdal.GetDriverByName("MEM").Create("", 256, 256, 4)
+        raster.WriteArray(tile)
+        gdal.GetDriverByName("PNG").CreateCopy(file, raster)
+        body = gdal.VSIFOpenL(file, "rb")
+        data = gdal.VSIFReadL(1, gdal.VSIStatL(file).size, body)
+        gdal.VSIFCloseL(body)
+        gdal.Unlink(file)
+        return bytes(data)
+
+
+@functools.cache
+def arctic_tiles():
+    return ArcticTiles()
+
+
+arctic_lock = threading.Lock()
+
+
 def shared_files(path):
-    """For Answering: the shared folder."""
+    """For Answering: the shared folder, and the arctic tiles."""
+    tile = re.fullmatch(r"/arctic/(\d+)/(\d+)/(\d+)\.png", path)
+    if tile:
+        with arctic_lock:
+            tiles = arctic_tiles()
+        return 200, "image/png", tiles.picture(*map(int, tile.groups()))
     file = SHARED / path.split("?")[0].lstrip("/")
     kinds = {".png": "image/png", ".xml": "text/xml", ".webp": "image/webp"}
     if not file.is_file():
