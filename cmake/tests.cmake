@@ -87,7 +87,7 @@ endforeach()
 
 # --- Scripts against the program: tests/e2e/*.{py,sh} -> e2e_<name>, tests/golden/*.{py,sh} -> golden_<name> -----------
 # Files whose names begin with _ are helpers. Among a script's first five lines `# label: slow` and `# timeout: N` count.
-# Exit status 77 means skipped.
+# Exit status 77 means skipped. The longest time-outs start first.
 
 set(script_environment "TELLURION=$<TARGET_FILE:tellurion>" "TELLURION_SHARED_DATA_DIR=${shared_data}"
   "TELLURION_TEST_DATA_DIR=${PROJECT_SOURCE_DIR}/tests/data" PYTHONDONTWRITEBYTECODE=1)
@@ -121,7 +121,7 @@ if(TARGET tellurion)
       endif()
       add_test(NAME ${kind}_${stem} COMMAND ${command} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
       set_tests_properties(${kind}_${stem} PROPERTIES
-        LABELS "${labels};${kind}" TIMEOUT ${timeout} SKIP_RETURN_CODE 77
+        LABELS "${labels};${kind}" TIMEOUT ${timeout} COST ${timeout} SKIP_RETURN_CODE 77
         ENVIRONMENT "${script_environment}")
     endforeach()
   endforeach()
