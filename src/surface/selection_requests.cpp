@@ -9,7 +9,7 @@ void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& re
   stats.tiles_waiting = 0;
   retries_later_ = false;
   stats.selected_by_level.clear();
-  for (Node& root : pool_.roots()) collect(frame, root, nullptr, stats);
+  for (Node& root : pool_.roots()) collect(frame, root, {}, stats);
   stats.retries_later = retries_later_;
   const auto order = [](const TileRequest& a, const TileRequest& b) {
     return std::tie(b.gain_px, a.key, a.part) < std::tie(a.gain_px, b.key, b.part);
@@ -48,16 +48,18 @@ bool RequestList::want_colour(const SelectionFrame& frame, Node& node) {
   return false;
 }
 
-void RequestList::collect(const SelectionFrame& frame, Node& node, const Node* shown, SelectionStats& stats) {
+void RequestList::collect(const SelectionFrame& frame, Node& node, StandIn shown, SelectionStats& stats) {
   if (!node.visible) return;
-  if (node.drawn == frame.number) shown = &node;
   const bool has_geometry = node.resident(Part::geometry) != nullptr;
+  if (node.drawn == frame.number) shown = {&node, to_pixels(frame.errors, node.error_m, node.distance)};
+  else if (has_geometry) shown.held_up_px = 0;
   // Errors of a stand-in are taken where the node is. Without one, finer tiles are drawn: nothing is lost by waiting.
-  const double shown_px = shown != nullptr ? to_pixels(frame.errors, shown->error_m, node.distance) : 0;
+  const double shown_px = shown.node != nullptr ? std::max(to_pixels(frame.errors, shown.node->error_m, node.distance), shown.held_up_px) : 0;
   if (node.split) {
-    const bool is_step = shown != nullptr && node.key.level % kOutlookLevels == 0;
+    const bool is_step = shown.node != nullptr && node.key.level % kOutlookLevels == 0;
     if (is_step && !has_geometry) want(frame, node, Part::geometry, shown_px);
     if (is_step) want_colour(frame, node);
+    if (is_step && shown.node != &node) shown.held_up_px = 0;
     for (int i = 0; i < 4; ++i) collect(frame, node.children[i], shown, stats);
     return;
   }

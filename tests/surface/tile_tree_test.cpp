@@ -387,6 +387,25 @@ TEST_CASE("select: levels that the facts describe are passed over, except for a 
   CHECK(asked.count(3) == 1);
 }
 
+TEST_CASE("select: what keeps a coarse tile in the picture is asked for before what only sharpens the view below it") {
+  EvenPlanet planet;
+  planet.colour_level = 0;
+  Flight flight(planet);
+  for (std::uint8_t face = 0; face < geo::kFaceCount; ++face) flight.loader.deliver({{face, 0, 0, 0}, Part::colour, 0});
+  // From near the ground to the horizon: finest tiles in front, coarse ones far away, all below the same root.
+  const view::Camera camera = camera_at(planet.ellipsoid, 20, 30, 30000, 0, -5);
+  const std::vector<TileRequest> first = flight.frame(camera, SelectionSettings{}, 0, 0).requests;
+  const geo::TileKey root = geo::ancestor(first.front().key, 0);
+  const auto below = [&](const TileRequest& r) { return geo::contains(root, r.key); };
+  const auto first_step = std::ranges::count_if(first, [&](const TileRequest& r) { return below(r) && r.key.level <= 3; });
+  REQUIRE(first_step > 3);
+  REQUIRE(first_step < std::ranges::count_if(first, below));
+  const auto draws_root = [&](const Selection& selection) { return std::ranges::find(selection.draw, root, &DrawTile::key) != selection.draw.end(); };
+  CHECK(draws_root(flight.frame(camera, SelectionSettings{}, 1, 1)));
+  for (int i = 1; i < first_step; ++i) flight.frame(camera, SelectionSettings{}, 1, 1);
+  CHECK_FALSE(draws_root(flight.frame(camera, SelectionSettings{}, 0, 0)));
+}
+
 TEST_CASE("eviction_candidate: never a tile of the last frame, never a root, children first, longest unused first") {
   const std::uint64_t seed = 8;
   CAPTURE(seed);
