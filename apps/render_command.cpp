@@ -46,10 +46,13 @@ int render(const Options& options) {
   std::string trace = globe::trace_header();
   TimedFrames frames(**view);
   bool complete = true;
+  bool out_of_time = false;
   if (options.after_ms) {
     draw_for(frames, camera, options.view, *options.after_ms, &trace);
   } else {
-    complete = (*view)->finish(camera, options.view, start + milliseconds(options.timeout_seconds * 1e3));
+    const auto deadline = start + milliseconds(options.timeout_seconds * 1e3);
+    complete = (*view)->finish(camera, options.view, deadline);
+    out_of_time = !complete && Clock::now() >= deadline;
   }
   globe::SummaryStats summary;
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -83,7 +86,7 @@ int render(const Options& options) {
     for (const auto& source : (*globe)->source_stats())
       if (!source.last_error.empty() && !is_known(source.last_error)) fmt::print(stderr, "tellurion: {}\n", source.last_error);
     fmt::print(stderr, "tellurion: {} is written, but {}\n", options.out.string(),
-               complete ? "some data could not be read" : "it is not complete: --timeout gives it more time");
+               out_of_time ? "it is not complete: --timeout gives it more time" : "some data could not be read");
     return kDataMissing;
   }
   return kDone;

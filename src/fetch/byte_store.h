@@ -23,7 +23,7 @@ struct StoreOptions {
   bool offline = false;                                 ///< nothing is fetched; what the disk has counts, however old
   std::chrono::seconds negative_lifetime{3600};         ///< for how long "there is no such file" is believed
   std::chrono::seconds default_lifetime{7 * 86400};     ///< of files of which the server does not say it
-  std::chrono::milliseconds pause_after_failure{5000};  ///< before a file that failed for good is asked for again; doubled for every
+  std::chrono::milliseconds pause_after_failure{500};  ///< before a file that failed for good is asked for again; doubled for every
                                                         ///< further failure, up to
   std::chrono::milliseconds longest_pause{60000};
   FetchOptions fetch;

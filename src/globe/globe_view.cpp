@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <thread>
 #include <variant>
 
@@ -21,7 +22,8 @@ using surface::Part;
 
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
-constexpr std::chrono::seconds kPause{2};  ///< before a part that failed is asked for again
+constexpr std::chrono::seconds kPause{1};  ///< before a part that failed is asked for again
+constexpr std::chrono::seconds kPatience{16};  ///< with failures, while nothing arrives: six attempts of a file
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
@@ -162,7 +164,10 @@ struct GlobeView::State {
   std::vector<WaitingPart> waiting;
   int roots_to_renew = 0;   ///< whose geometry was built by older facts and has not been asked for again
   int roots_renewing = 0;
-  std::vector<std::pair<Clock::time_point, geo::TileKey>> roots_to_retry;  ///< whose heights failed: a bare ellipsoid stands in until then
+  std::map<geo::TileKey, Clock::time_point> roots_to_retry;  ///< whose heights failed: a bare ellipsoid stands in until then
+  Clock::time_point last_progress;   ///< when a part or a byte of one arrived
+  std::int64_t last_bytes_fetched = 0;
+  bool failed_in_vain = false;       ///< since then
   int max_in_flight = 0;
   std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
@@ -185,6 +190,8 @@ struct GlobeView::State {
   void wait_for_half(Clock::time_point deadline);
   Result<void> upload(const Finished& item);
   bool make_room(Part part);
+  void note_progress();
+  bool has_given_up();
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
   Result<void> load_roots();
 };
@@ -216,7 +223,7 @@ void GlobeView::State::renew_roots() {
     ++in_flight;
   }
   std::erase_if(roots_to_retry, [&](const auto& retry) {
-    if (Clock::now() < retry.first || !submit(retry.second, Part::geometry)) return false;
+    if (Clock::now() < retry.second || !submit(retry.first, Part::geometry)) return false;
     ++roots_renewing;
     ++in_flight;
     return true;
@@ -340,11 +347,13 @@ void GlobeView::State::take_over(Finished item) {
       return tree.cancelled(item.key, item.part);
     }
     const bool may_work_later = error.code == ErrorCode::unavailable;
-    if (may_work_later && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.emplace_back(Clock::now() + kPause, item.key);
+    failed_in_vain = failed_in_vain || may_work_later;
+    if (may_work_later && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.insert_or_assign(item.key, Clock::now() + kPause);
     const auto retry_at = may_work_later ? Clock::now() + kPause : Clock::time_point::max();
     if (renews) slots.failed(item.key, retry_at);
     return tree.failed(item.key, item.part, retry_at);
   }
+  note_progress();
   if (item.part == Part::geometry) {
     const auto& geometry = std::get<surface::TileGeometry>(item.content);
     tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
@@ -434,6 +443,22 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.frame_ms = ms_since(start);
 }
 
+void GlobeView::State::note_progress() {
+  last_progress = Clock::now();
+  failed_in_vain = false;
+}
+
+/// Whether all that is missing has failed for good, or goes on failing while nothing arrives.
+bool GlobeView::State::has_given_up() {
+  if (const std::int64_t bytes = globe.fetch_stats().bytes; bytes != last_bytes_fetched) {
+    last_bytes_fetched = bytes;
+    note_progress();
+  }
+  if (failed_in_vain && Clock::now() - last_progress > kPatience) return true;
+  const bool idle = in_flight == 0 && waiting.empty() && roots_to_renew == 0 && roots_to_retry.empty() && selection->requests.empty();
+  return idle && !selection->stats.retries_later && !stale.may_change && first_facts == globe.facts();
+}
+
 Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& key) {
   auto nothing = std::make_shared<surface::SurfaceDescription>();
   nothing->ellipsoid = globe.ellipsoid();
@@ -472,7 +497,7 @@ Result<void> GlobeView::State::load_roots() {
       auto bare = build_bare(item->key);
       if (!bare) return bare.error();
       if (auto* awaited = std::get_if<source::Awaited>(&item->content)) late.push_back(waiting_part(item->key, item->part, std::move(*awaited)));
-      else if (std::get<Error>(item->content).code == ErrorCode::unavailable) roots_to_retry.emplace_back(Clock::now() + kPause, item->key);
+      else if (std::get<Error>(item->content).code == ErrorCode::unavailable) roots_to_retry.insert_or_assign(item->key, Clock::now() + kPause);
       item->content = std::move(*bare);
     }
     take_over(std::move(*item));
@@ -532,11 +557,11 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   State& s = *state_;
   if (!s.globe.wait_for_tables(deadline)) return false;
   constexpr double kNoLimit = 1e9;
+  s.note_progress();
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;
-    const bool idle = s.in_flight == 0 && s.waiting.empty() && s.roots_to_renew == 0 && s.roots_to_retry.empty() && s.selection->requests.empty() && !s.selection->stats.retries_later && !s.stale.may_change;
-    if (idle && s.first_facts == s.globe.facts()) return false;  // the rest has failed for good
+    if (s.has_given_up()) return false;
     const auto now = Clock::now();
     if (now >= deadline) return false;
     s.wait_for_half(std::min(deadline, now + std::chrono::milliseconds(50)));

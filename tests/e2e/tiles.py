@@ -216,6 +216,9 @@ class Tiles(Case):
         self.assertIn("{y}", done.stderr)
         done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", self.folder / "x.png", "--timeout", 8, status=3)
         self.assertIn("is the server there", done.stderr)
+        # Without a limit it gives up by itself.
+        done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", self.folder / "x.png", status=3, timeout=60)
+        self.assertIn("some data could not be read", done.stderr)
         with TileServer() as server:
             done = self.tellurion("render", self.night(server, "max_level = 4, tile_size = 512"), "--out", self.folder / "x.png",
                                   "--timeout", 8, status=3)
