@@ -1,6 +1,5 @@
 """Servers on loopback for services.py: the shared folder's files, MapProxy over them, nginx, and one that answers as it is told."""
 import functools
-import http.server
 import os
 import pathlib
 import re
@@ -16,8 +15,7 @@ import numpy as np
 from osgeo import gdal, osr
 
 from _common import SHARED
-
-NIGHT = "earth/tiles/blackmarble_tms_mercator"
+from _servers import NIGHT, Reply, Server, picture_bytes
 
 MAPPROXY = """
 services:
@@ -90,44 +88,19 @@ make_server("127.0.0.1", int(sys.argv[2]), make_wsgi_app(sys.argv[1]), Server, Q
 """
 
 
-class Answering:
-    """An HTTP server that calls `answer(path)`, path with its query, for (status, content type, bytes); keeps what was asked."""
+class Answering(Server):
+    """Calls `answer(path)`, path with its query, for (status, content type, bytes); keeps what was asked."""
 
     def __init__(self, answer):
-        self.asked, self.headers = [], []
-        lock, server = threading.Lock(), self
+        self.asked, self.headers, self.reply = [], [], answer
+        super().__init__()
 
-        class Handler(http.server.BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-
-            def do_GET(self):
-                with lock:
-                    server.asked.append(self.path)
-                    server.headers.append(dict(self.headers))
-                status, content, body = answer(self.path)
-                self.send_response(status)
-                self.send_header("Content-Type", content)
-                self.send_header("Content-Length", str(len(body)))
-                self.end_headers()
-                self.wfile.write(body)
-
-            def log_message(self, *_):
-                pass
-
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.http.daemon_threads = True
-        self.base = f"http://127.0.0.1:{self.http.server_port}"
-        threading.Thread(target=self.http.serve_forever, daemon=True).start()
-
-    def close(self):
-        self.http.shutdown()
-        self.http.server_close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
+    def answer(self, path, headers):
+        with self.lock:
+            self.asked.append(path)
+            self.headers.append(headers)
+        status, content, body = self.reply(path)
+        return Reply(status, body, {"Content-Type": content})
 
 
 def web_mercator_night():
@@ -164,16 +137,7 @@ class ArcticTiles:
             self.levels.append(raster.ReadAsArray())
 
     def picture(self, level, x, y):
-        tile = self.levels[level][:, 256 * y:256 * (y + 1), 256 * x:256 * (x + 1)]
-        file = f"/vsimem/arctic-{threading.get_ident()}.png"
-        raster = gdal.GetDriverByName("MEM").Create("", 256, 256, 4)
-        raster.WriteArray(tile)
-        gdal.GetDriverByName("PNG").CreateCopy(file, raster)
-        body = gdal.VSIFOpenL(file, "rb")
-        data = gdal.VSIFReadL(1, gdal.VSIStatL(file).size, body)
-        gdal.VSIFCloseL(body)
-        gdal.Unlink(file)
-        return bytes(data)
+        return picture_bytes(self.levels[level][:, 256 * y:256 * (y + 1), 256 * x:256 * (x + 1)])
 
 
 @functools.cache

@@ -4,7 +4,6 @@
 import collections
 import contextlib
 import gzip
-import http.server
 import os
 import pathlib
 import random
@@ -14,7 +13,6 @@ import socket
 import sqlite3
 import struct
 import subprocess
-import threading
 import time
 import unittest
 
@@ -22,6 +20,7 @@ import numpy as np
 from osgeo import gdal
 
 from _common import SHARED, Case, read_picture, shared
+from _servers import NOT_FOUND, Reply, Server
 
 PMTILES = "earth/archives/bluemarble-merc.pmtiles"
 HALF = 20037508.342789244
@@ -35,61 +34,30 @@ COGS = {  # file: planet, view, group
 # --- Servers ---------------------------------------------------------------------------------------------------------
 
 
-class RangeServer:
+class RangeServer(Server):
     """Serves folders in parts and counts the parts."""
 
     def __init__(self, *folders):
         self.asked = collections.Counter()
-        lock, server = threading.Lock(), self
-
-        class Handler(http.server.BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-
-            def do_GET(self):
-                path = self.path.split("?")[0].lstrip("/")
-                part = self.headers.get("Range")
-                with lock:
-                    server.asked[path, part] += 1
-                files = [pathlib.Path(folder) / path for folder in folders]
-                file = next((f for f in files if f.is_file()), None)
-                if file is None:
-                    return self.answer(404, b"")
-                whole = file.read_bytes()
-                found = re.fullmatch(r"bytes=(\d+)-(\d+)", part or "")
-                if not found or server.whole_only:
-                    return self.answer(200, whole)
-                first, last = int(found[1]), min(int(found[2]), len(whole) - 1)
-                if first > last:
-                    return self.answer(416, b"")
-                return self.answer(206, whole[first:last + 1], f"bytes {first}-{last}/{len(whole)}", f'"{file.stat().st_mtime_ns}"')
-
-            def answer(self, status, body, part=None, etag=None):
-                self.send_response(status)
-                self.send_header("Content-Length", str(len(body)))
-                if part:
-                    self.send_header("Content-Range", part)
-                    self.send_header("ETag", etag)
-                self.end_headers()
-                with contextlib.suppress(ConnectionError):
-                    self.wfile.write(body)
-
-            def log_message(self, *_):
-                pass
-
+        self.folders = [pathlib.Path(folder) for folder in folders]
         self.whole_only = False
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.http.daemon_threads = True
-        threading.Thread(target=self.http.serve_forever, daemon=True).start()
+        super().__init__()
 
-    def url(self, path):
-        return f"http://127.0.0.1:{self.http.server_port}/{path}"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.http.shutdown()
-        self.http.server_close()
+    def answer(self, path, headers):
+        path, part = path.split("?")[0].lstrip("/"), headers.get("Range")
+        with self.lock:
+            self.asked[path, part] += 1
+        file = next((f for folder in self.folders if (f := folder / path).is_file()), None)
+        if file is None:
+            return NOT_FOUND
+        whole = file.read_bytes()
+        found = re.fullmatch(r"bytes=(\d+)-(\d+)", part or "")
+        if not found or self.whole_only:
+            return Reply(200, whole)
+        first, last = int(found[1]), min(int(found[2]), len(whole) - 1)
+        if first > last:
+            return Reply(416)
+        return Reply(206, whole[first:last + 1], {"Content-Range": f"bytes {first}-{last}/{len(whole)}", "ETag": f'"{file.stat().st_mtime_ns}"'})
 
 
 class Nginx:

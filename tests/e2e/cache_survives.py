@@ -10,7 +10,7 @@ import time
 import unittest
 
 from _common import PROGRAM, Case, camera_text
-from tiles import NIGHT, TileServer
+from _servers import NIGHT, TileServer
 
 KILLS = 200
 VIEW = (30, 30, 15000000, 0, -90)

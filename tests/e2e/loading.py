@@ -9,7 +9,7 @@ import unittest
 import numpy as np
 
 from _common import SHARED, Case, read_picture, read_trace
-from tiles import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
+from _servers import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
 
 MB = 1 << 20
 RAINIER = (46.85, -121.95, 7000, 90, -20)

@@ -9,7 +9,7 @@ import time
 import unittest
 
 from _common import ETOPO5, PROGRAM, SHARED, Case, shared
-from tiles import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
+from _servers import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
 
 
 def columns_and_rows(west, south, east, north, zoom):

@@ -8,7 +8,8 @@ import unittest
 import numpy as np
 
 from _common import ROOT, Case, read_picture
-from _services import NIGHT, Answering, mapproxy, nginx, shared_files
+from _servers import NIGHT
+from _services import Answering, mapproxy, nginx, shared_files
 
 SAVED = ROOT / "tests/data/services"
 PLAIN = ("--no-atmosphere", "--no-lighting", "--size", "480x270", "--timeout", "600")
@@ -174,7 +175,7 @@ class Services(Case):
         self.fault("no-wms-layer", f'type = "wms", url = "{wms}", layers = "night,day"', '"day"', "it has night")
         self.fault("no-wms-style", f'type = "wms", url = "{wms}", layers = "night", styles = "red"', '"red"')
         self.fault("no-crs", f'type = "wms", url = "{wms}", layers = "night", crs = "EPSG:2180"', '"EPSG:2180"', "EPSG:25832")
-        self.fault("no-map", f'type = "tms", url = "{self.base}/tms/1.0.0/"', "there is no such document")
+        self.fault("no-map", f'type = "tms", url = "{self.base}/tms/1.0.0/"', "there is no such file")
 
     def test_broken_services_are_named(self):
         known = (SAVED / "mapproxy_wms_1.3.0.xml").read_text()
@@ -187,7 +188,7 @@ class Services(Case):
         }
         with Answering(lambda path: replies.get(path.split("?")[0], (404, "text/plain", b""))) as server:
             for path, parts in {"/401": ("check the key",), "/page": ("HTML",), "/half": ("XML", "line"), "/error": ("unknown layer: none",),
-                                "/strange": ("EPSG:999999", "PROJ"), "/none": ("no such document",)}.items():
+                                "/strange": ("EPSG:999999", "PROJ"), "/none": ("no such file",)}.items():
                 self.fault("broken" + path[1:], f'type = "wms", url = "{server.base}{path}", layers = "night"', server.base + path, *parts)
             # What is worthless is not kept: now the page is gone.
             replies["/page"] = (200, "text/xml", known.replace("http://127.0.0.1:8998", self.base).encode())

@@ -3,10 +3,8 @@
 # timeout: 900
 import collections
 import gzip
-import http.server
 import json
 import struct
-import threading
 import unittest
 import zlib
 
@@ -14,6 +12,7 @@ import numpy as np
 from osgeo import gdal
 
 from _common import Case, read_geo
+from _servers import NOT_FOUND, Reply, Server, picture_bytes
 
 LEVELS = 6  # 0 to 5
 
@@ -24,50 +23,24 @@ def formula(lon, lat):
     return 2500.0 + 1500.0 * np.sin(3 * lon) * np.cos(lat) ** 2 + 800.0 * np.sin(2 * lat)
 
 
-class Server:
-    """Answers paths by functions; what gives None is not there."""
+class Terrain(Server):
+    """Answers paths by a function; what it gives None for is not there. Every other tile is packed; of those every other says so."""
 
-    def __init__(self, answer):
-        self.asked = collections.Counter()
-        server, lock = self, threading.Lock()
+    def __init__(self, body_of):
+        self.asked, self.body_of = collections.Counter(), body_of
+        super().__init__()
 
-        class Handler(http.server.BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-
-            def do_GET(self):
-                path = self.path.split("?")[0]
-                with lock:
-                    server.asked[path] += 1
-                body = answer(path)
-                self.send_response(404 if body is None else 200)
-                # Every other tile is packed; of those every other says so.
-                sum_of_path = zlib.crc32(path.encode())
-                packed = body is not None and path.endswith(".terrain") and sum_of_path % 2 == 0
-                if packed:
-                    body = gzip.compress(body, 1)
-                    if sum_of_path % 4 == 0:
-                        self.send_header("Content-Encoding", "gzip")
-                self.send_header("Content-Type", "application/octet-stream")
-                self.send_header("Content-Length", str(len(body or b"")))
-                self.end_headers()
-                self.wfile.write(body or b"")
-
-            def log_message(self, *_):
-                pass
-
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.http.daemon_threads = True
-        threading.Thread(target=self.http.serve_forever, daemon=True).start()
-
-    def url(self, path):
-        return f"http://127.0.0.1:{self.http.server_port}/{path}"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.http.shutdown()
-        self.http.server_close()
+    def answer(self, path, headers):
+        path = path.split("?")[0]
+        with self.lock:
+            self.asked[path] += 1
+        body = self.body_of(path)
+        if body is None:
+            return NOT_FOUND
+        sum_of_path = zlib.crc32(path.encode())
+        if not path.endswith(".terrain") or sum_of_path % 2:
+            return Reply(200, body)
+        return Reply(200, gzip.compress(body, 1), {} if sum_of_path % 4 else {"Content-Encoding": "gzip"})
 
 
 # --- Encoders --------------------------------------------------------------------------------------------------------
@@ -130,16 +103,7 @@ def coded_picture(z, x, y, code, driver="PNG", size=256):
     at = (np.arange(size) + 0.5) / size
     lon, lat = (x + at) / 2 ** z * 360 - 180, mercator_latitude((y + at) / 2 ** z)
     numbers = code(formula(*np.meshgrid(lon, lat))).astype(int)
-    picture = gdal.GetDriverByName("MEM").Create("", size, size, 3)
-    for band, shift in ((1, 16), (2, 8), (3, 0)):
-        picture.GetRasterBand(band).WriteArray((numbers >> shift & 255).astype(np.uint8))
-    name = f"/vsimem/tile-{threading.get_ident()}"
-    gdal.GetDriverByName(driver).CreateCopy(name, picture)
-    file = gdal.VSIFOpenL(name, "rb")
-    bytes_ = gdal.VSIFReadL(1, 10 ** 7, file)
-    gdal.VSIFCloseL(file)
-    gdal.Unlink(name)
-    return bytes(bytes_)
+    return picture_bytes([numbers >> shift & 255 for shift in (16, 8, 0)], driver)
 
 
 def address(path):
@@ -188,7 +152,7 @@ class TerrainTiles(Case):
             step, grid = 180 / 2 ** z, np.arange(65) / 64
             return heightmap(-180 + (x + grid) * step, -90 + (y + 1 - grid) * step)
 
-        with Server(tile) as server:
+        with Terrain(tile) as server:
             # Half a step of 0.2 m; lines between samples 0.09 degrees apart add 0.01 m, twice.
             self.check_heights(f'type = "cesium-terrain", url = "{server.url("layer.json")}"', self.places, 0.13)
             self.assertEqual(set(server.asked.values()), {1}, "nothing is asked for twice")
@@ -203,7 +167,7 @@ class TerrainTiles(Case):
             step = 180 / 2 ** z
             return quantized_mesh(-180 + x * step, -90 + y * step, -180 + (x + 1) * step, -90 + (y + 1) * step)
 
-        with Server(tile) as server:
+        with Terrain(tile) as server:
             source = f'type = "cesium-terrain", url = "{server.url("layer.json")}"'
             # Triangles 0.18 degrees wide lie up to 0.03 m beside the formula; quantization adds 0.02 m.
             self.check_heights(source, self.places, 0.08)
@@ -227,7 +191,7 @@ class TerrainTiles(Case):
             step = 180 / 2 ** z
             return quantized_mesh(-180 + x * step, -90 + y * step, -180 + (x + 1) * step, -90 + (y + 1) * step)
 
-        with Server(tile) as server:
+        with Terrain(tile) as server:
             self.render(self.world_of(f'type = "cesium-terrain", url = "{server.url("layer.json")}"'), (10, 0, 20000000, 0, -90), name="listed")
             tiles = {path for path in server.asked if path.endswith(".terrain")}
         self.assertLessEqual(tiles, {"/0/0/0.terrain", "/0/1/0.terrain", "/1/2/1.terrain", "/1/3/1.terrain"})
@@ -240,27 +204,27 @@ class TerrainTiles(Case):
             z, x, y = at
             return quantized_mesh(x / 2 ** z * 360 - 180, mercator_latitude((y + 1) / 2 ** z), (x + 1) / 2 ** z * 360 - 180, mercator_latitude(y / 2 ** z))
 
-        with Server(tile) as server:
+        with Terrain(tile) as server:
             source = (f'type = "xyz", url = "{server.url("{z}/{x}/{y}.terrain")}", encoding = "quantized-mesh", max_level = {LEVELS - 1}, '
                       'tile_size = 128, vertical = "ellipsoid"')
             self.check_heights(source, [place for place in self.places if abs(place[0]) < 84], 0.3)
 
     def test_centimetres_in_lossless_pictures(self):
         code = lambda heights: np.rint((heights + 1000) * 100) * 16
-        with Server(lambda path: coded_picture(*at, code) if (at := address(path)) else None) as server:
+        with Terrain(lambda path: coded_picture(*at, code) if (at := address(path)) else None) as server:
             source = f'type = "xyz", url = "{server.url("{z}/{x}/{y}.png")}", encoding = "centimetres", max_level = {LEVELS - 1}, vertical = "ellipsoid"'
             # A centimetre; lines between samples 0.04 degrees apart add less than half of one.
             self.check_heights(source, [place for place in self.places if abs(place[0]) < 84], 0.015)
 
     def test_codes_in_lossy_pictures_are_refused(self):
         code = lambda heights: np.rint((heights + 32768) * 256)
-        with Server(lambda path: coded_picture(*at, code, "JPEG") if (at := address(path)) else None) as server:
+        with Terrain(lambda path: coded_picture(*at, code, "JPEG") if (at := address(path)) else None) as server:
             source = f'type = "xyz", url = "{server.url("{z}/{x}/{y}.jpg")}", encoding = "terrarium", max_level = 2, vertical = "ellipsoid"'
             done = self.tellurion("render", self.world_of(source), "--out", self.folder / "x.png", "--timeout", 20, status=3)
         self.assertIn("lossless", done.stderr)
 
     def test_what_is_wrong_is_said(self):
-        with Server(lambda path: b"<html>" if path.endswith("layer.json") else None) as server:
+        with Terrain(lambda path: b"<html>" if path.endswith("layer.json") else None) as server:
             done = self.tellurion("render", self.world_of(f'type = "cesium-terrain", url = "{server.url("layer.json")}?key=sesame"'),
                                   "--out", self.folder / "x.png", status=3)
             self.assertIn("is no layer.json", done.stderr)

@@ -1,91 +1,16 @@
 """Tiles from a server on loopback: asked for once, kept for the next time, and faults survived."""
 # label: slow
 # timeout: 900
-import collections
-import http.server
 import json
 import random
 import sqlite3
-import threading
-import time
 import unittest
 
 import numpy as np
 from osgeo import gdal
 
 from _common import ETOPO5, SHARED, Case, read_geo, shared
-
-NIGHT = "earth/tiles/blackmarble_tms_mercator"
-TERRARIUM = "earth/tiles/terrarium_etopo5"
-RAINIER_TILES = "earth/tiles/terrain_rgb_webp_rainier"
-
-
-class TileServer:
-    """Serves the shared folder of tiles, counts what is asked for, and answers wrongly when told to."""
-
-    def __init__(self, fault=lambda path, times: None):
-        self.asked = collections.Counter()
-        self.headers = {}
-        lock = threading.Lock()
-        server = self
-
-        class Handler(http.server.BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-
-            def do_GET(self):
-                path = self.path.split("?")[0]
-                with lock:
-                    server.asked[path] += 1
-                    server.headers[path] = dict(self.headers)
-                    times = server.asked[path]
-                kind = fault(path, times)
-                if kind == "reset":
-                    self.close_connection = True
-                    return
-                if kind == "stall":
-                    time.sleep(3)
-                file = SHARED / path.lstrip("/")
-                body = file.read_bytes() if file.is_file() else b""
-                status, claimed, content = (200, len(body), "image/png") if body else (404, 0, "text/plain")
-                extra = []
-                if isinstance(kind, int):
-                    status, body, claimed = kind, b"", 0
-                    extra = [("Retry-After", "1")] if kind == 429 else []
-                elif kind == "truncated":
-                    body, self.close_connection = body[:len(body) // 2], True
-                elif kind == "page":
-                    body, content = b"<html>no tile for you</html>", "text/html"
-                    claimed = len(body)
-                elif kind == "corrupt":
-                    body = body[:40] + bytes(255 - b for b in body[40:])
-                elif kind == "large":
-                    body = (SHARED / "moon/moon_4k.jpg").read_bytes()
-                    claimed = len(body)
-                self.send_response(status)
-                self.send_header("Content-Type", content)
-                self.send_header("Content-Length", str(claimed))
-                for header in extra:
-                    self.send_header(*header)
-                self.end_headers()
-                self.wfile.write(body)
-
-            def log_message(self, *_):
-                pass
-
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.http.daemon_threads = True
-        self.http.handle_error = lambda *_: None  # programs that are killed leave their connections
-        threading.Thread(target=self.http.serve_forever, daemon=True).start()
-
-    def url(self, path):
-        return f"http://127.0.0.1:{self.http.server_port}/{path}"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.http.shutdown()
-        self.http.server_close()
+from _servers import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
 
 
 class Tiles(Case):

@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 
 from _common import read_picture
-from tiles import NIGHT, TileServer
+from _servers import NIGHT, TileServer
 from viewer import SIZE, WindowTest, run_on_display_in_memory
 
 FAR = (30, 30, 12000000, 0, -90)
