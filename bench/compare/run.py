@@ -278,35 +278,45 @@ def chosen(text, all_of):
     return names
 
 
-def parse_options():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def parse_options(about, browsers=True):
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     environment = os.environ.get
     parser.add_argument("--tile-server", default=environment("TELLURION_TILE_SERVER"), metavar="PROGRAM.py", help="or $TELLURION_TILE_SERVER")
     parser.add_argument("--cache", type=pathlib.Path, metavar="DIR", help="where the server keeps its tiles (default: tiles in --out)")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("compare-results"), metavar="DIR")
     parser.add_argument("--tellurion", default=environment("TELLURION", ROOT / "build/release/bin/tellurion"), metavar="PROGRAM")
-    parser.add_argument("--chromium", default=shutil.which("chromium"), metavar="PROGRAM")
     parser.add_argument("--runs", type=int, default=3)
-    parser.add_argument("--hold", type=float, default=20, metavar="S", help="how long Tellurion stays after a flight (20)")
     parser.add_argument("--timeout", type=int, default=120, metavar="S", help="for a view to be complete (120)")
-    parser.add_argument("--systems", default=";".join(DEFAULT_SYSTEMS), help="some of: " + "; ".join(SYSTEMS))
-    parser.add_argument("--scenarios", default=";".join(s.name for s in SCENARIOS), help="some of: " + "; ".join(s.name for s in SCENARIOS))
+    if browsers:
+        add_comparison(parser)
     options = parser.parse_args()
     if not options.tile_server:
         parser.error("--tile-server or $TELLURION_TILE_SERVER must name the tile server")
-    options.systems = chosen(options.systems, SYSTEMS)
-    by_name = {scenario.name: scenario for scenario in SCENARIOS}
-    options.scenarios = [by_name[name] for name in chosen(options.scenarios, by_name)]
-    if any(SYSTEMS[system][0] for system in options.systems) and not (options.chromium and (HERE / "node_modules").is_dir()):
-        parser.error("the browser's packages are missing: tools/setup.sh --bench installs them")
+    if browsers:
+        check_comparison(parser, options)
     options.out = options.out.resolve()
     options.cache = (options.cache or options.out / "tiles").resolve()
     options.out.mkdir(parents=True, exist_ok=True)
     return options
 
 
+def add_comparison(parser):
+    parser.add_argument("--chromium", default=shutil.which("chromium"), metavar="PROGRAM")
+    parser.add_argument("--hold", type=float, default=20, metavar="S", help="how long Tellurion stays after a flight (20)")
+    parser.add_argument("--systems", default=";".join(DEFAULT_SYSTEMS), help="some of: " + "; ".join(SYSTEMS))
+    parser.add_argument("--scenarios", default=";".join(s.name for s in SCENARIOS), help="some of: " + "; ".join(s.name for s in SCENARIOS))
+
+
+def check_comparison(parser, options):
+    options.systems = chosen(options.systems, SYSTEMS)
+    by_name = {scenario.name: scenario for scenario in SCENARIOS}
+    options.scenarios = [by_name[name] for name in chosen(options.scenarios, by_name)]
+    if any(SYSTEMS[system][0] for system in options.systems) and not (options.chromium and (HERE / "node_modules").is_dir()):
+        parser.error("the browser's packages are missing: tools/setup.sh --bench installs them")
+
+
 def main():
-    options = parse_options()
+    options = parse_options(__doc__)
     measure_all(options)
     print((options.out / "results.md").read_text(), end="")
 
