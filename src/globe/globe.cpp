@@ -113,7 +113,7 @@ source::ServiceOptions service_options(const LayerSpec& layer) {
   const SourceSpec& source = layer.source;
   source::ServiceOptions options;
   options.url = source.url;
-  for (const auto& [name, value] : source.headers) options.headers.push_back(name + ": " + value);
+  options.headers = header_lines(source);
   options.kind = kind_of(layer.group);
   options.encoding = source.encoding;
   options.layer = source.service.layer;
@@ -363,6 +363,7 @@ std::shared_ptr<const surface::SurfaceFacts> Globe::facts() const {
 }
 
 std::shared_ptr<const surface::SurfaceDescription> Globe::surface_at(const std::optional<UtcTime>& time) const { return state_->steps->at(time); }
+std::shared_ptr<const surface::SurfaceDescription> Globe::held_surface_at(const std::optional<UtcTime>& time) const { return state_->steps->held_at(time); }
 
 std::shared_ptr<const surface::SurfaceFacts> Globe::facts_of(const std::shared_ptr<const surface::SurfaceDescription>& surface) const {
   State& s = *state_;
@@ -378,6 +379,11 @@ std::shared_ptr<const surface::SurfaceFacts> Globe::facts_of(const std::shared_p
 bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) {
   State& s = *state_;
   return s.pool->try_submit([&s, work = std::move(work)](int worker) { work(*s.workers[static_cast<std::size_t>(worker)]); });
+}
+
+bool Globe::try_submit_at(const std::optional<UtcTime>& time,
+                          std::function<void(SurfaceWorker&, const std::shared_ptr<const surface::SurfaceDescription>&)> work) {
+  return try_submit([&steps = *state_->steps, time, work = std::move(work)](SurfaceWorker& worker) { work(worker, steps.at(time)); });
 }
 
 bool Globe::run_one() { return state_->pool->run_one(); }

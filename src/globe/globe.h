@@ -118,9 +118,14 @@ class Globe {
   std::shared_ptr<const surface::SurfaceFacts> facts() const;   ///< of it; replaced when the tables are ready
   /// The surface at another time (opens files where a step comes up): the same object while no layer's step changes.
   std::shared_ptr<const surface::SurfaceDescription> surface_at(const std::optional<UtcTime>& time) const;
+  /// The same if it was asked for lately; else null. Opens nothing.
+  std::shared_ptr<const surface::SurfaceDescription> held_surface_at(const std::optional<UtcTime>& time) const;
   std::shared_ptr<const surface::SurfaceFacts> facts_of(const std::shared_ptr<const surface::SurfaceDescription>& surface) const;
   /// Runs `work` on a worker with its own readers. False if too much waits; never waits itself.
   bool try_submit(std::function<void(SurfaceWorker&)> work);
+  /// The same with the surface at `time`, which the worker opens.
+  bool try_submit_at(const std::optional<UtcTime>& time,
+                     std::function<void(SurfaceWorker&, const std::shared_ptr<const surface::SurfaceDescription>&)> work);
   /// Without threads: runs a waiting job. False if there is none, or there are threads.
   bool run_one();
   int worker_count() const;

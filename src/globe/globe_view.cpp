@@ -1,8 +1,6 @@
 #include "globe/globe_view.h"
 
 #include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <map>
 #include <thread>
 #include <variant>
@@ -10,9 +8,13 @@
 #include <glm/geometric.hpp>
 
 #include "base/bounded_queue.h"
-#include "geo/sun.h"
+#include "globe/ground_below.h"
+#include "globe/motion.h"
 #include "globe/slot_ages.h"
+#include "globe/steps_ahead.h"
 #include "globe/surface_worker.h"
+#include "globe/view_look.h"
+#include "globe/waiting_part.h"
 
 namespace tellurion::globe {
 namespace {
@@ -24,7 +26,6 @@ constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::chrono::seconds kPause{1};  ///< before a part that failed is asked for again
 constexpr std::chrono::seconds kPatience{16};  ///< with failures, while nothing arrives: six attempts of a file
-constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
 constexpr std::size_t kMostAhead = 32;     ///< of them those that only a later view wants
@@ -44,105 +45,7 @@ struct Finished {
 
 using FinishedQueue = BoundedQueue<Finished>;
 
-/// A part that is built once its data have come. Who drops it lets go of the data.
-struct WaitingPart {
-  geo::TileKey key;
-  Part part = Part::geometry;
-  source::Awaited awaited;
-  std::shared_ptr<std::atomic<std::size_t>> missing;
-};
-
-WaitingPart waiting_part(const geo::TileKey& key, Part part, source::Awaited awaited) {
-  WaitingPart waiting{key, part, std::move(awaited), std::make_shared<std::atomic<std::size_t>>(0)};
-  *waiting.missing = waiting.awaited.size();
-  for (const auto& arrival : waiting.awaited) arrival->then([missing = waiting.missing] { --*missing; });
-  return waiting;
-}
-
-/// Screen error gained per byte, for what a part waits for. Files of which nothing is known count as 16 KB.
-double gain_of(const WaitingPart& part, double gain_px) {
-  constexpr double kUsualBytes = 16384;
-  double bytes = 1;
-  for (const auto& arrival : part.awaited) {
-    if (!arrival->over()) bytes += arrival->expected_bytes() > 0 ? arrival->expected_bytes() : kUsualBytes;
-  }
-  return gain_px / bytes;
-}
-
-/// The last height found under the eye; written by a worker, read by the render thread.
-struct GroundAnswer {
-  std::atomic<bool> known{false};
-  std::atomic<bool> asked{false};
-  std::atomic<double> metres{0.0};
-  source::Awaited awaited;  ///< what the next answer waits for; the worker's while `asked`
-};
-
-render::FrameLook look_of(const ViewSettings& settings, const World& world, const view::Camera& camera) {
-  render::FrameLook look;
-  look.exaggeration = settings.exaggeration;
-  look.lighting = settings.lighting;
-  look.atmosphere = settings.atmosphere && world.planet == "Earth";
-  look.wireframe = settings.wireframe;
-  look.bounds = settings.bounds;
-  look.tile_borders = settings.tile_borders;
-  look.antialiasing = settings.antialiasing;
-  look.anisotropy = settings.anisotropy;
-  look.clear = settings.clear;
-  look.to_sun = light_direction(world, camera, settings.time);
-  return look;
-}
-
-surface::SelectionSettings selection_of(const ViewSettings& settings, std::size_t max_bytes) {
-  surface::SelectionSettings selection;
-  selection.sse_px = settings.sse_px;
-  selection.exaggeration = settings.exaggeration;
-  selection.metric = settings.lod;
-  selection.anisotropy = settings.anisotropy;
-  selection.max_tiles = kMostTiles;
-  selection.max_bytes = max_bytes;
-  selection.transitions = settings.transitions;
-  selection.frozen = settings.frozen;
-  return selection;
-}
-
 }  // namespace
-
-geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& camera, const std::optional<UtcTime>& time) {
-  if (time) {
-    if (const auto sun = geo::direction_to_sun(world.planet, *time)) return *sun;
-  }
-  const geo::Geodetic below = geo::to_geodetic(world.ellipsoid, camera.eye);
-  const auto enu = geo::enu_at(world.ellipsoid, below);
-  return enu(geo::Vector<geo::Enu>{{-0.5, 0.5, std::sqrt(0.5)}});
-}
-
-/// Where the eye will be if it goes on as it does, but not much nearer to the ground. Nothing if it rests.
-class Motion {
- public:
-  std::optional<view::Camera> foresee(const geo::Ellipsoid& ellipsoid, const view::Camera& camera, Clock::time_point now) {
-    constexpr double kAhead = 1.0;          // seconds
-    constexpr double kLongestFrame = 0.25;  // after a longer pause it is another motion
-    constexpr double kLeastStep = 1e-4;     // of the height, in the time ahead
-    const double elapsed = std::chrono::duration<double>(now - time_).count();
-    const glm::dvec3 step = camera.eye.xyz - eye_;
-    eye_ = camera.eye.xyz;
-    time_ = now;
-    if (!(elapsed > 0.0 && elapsed < kLongestFrame)) return std::nullopt;
-    const double height = geo::to_geodetic(ellipsoid, camera.eye).height.value;
-    glm::dvec3 way = step * (kAhead / elapsed);
-    if (glm::length(way) < kLeastStep * std::abs(height)) return std::nullopt;
-    view::Camera later = camera;
-    for (int i = 0; i < 4; ++i, way *= 0.5) {
-      later.eye.xyz = eye_ + way;
-      if (geo::to_geodetic(ellipsoid, later.eye).height.value > 0.5 * height) return later;
-    }
-    return std::nullopt;
-  }
-
- private:
-  glm::dvec3 eye_{0.0};
-  Clock::time_point time_;
-};
 
 struct GlobeView::State {
   State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()), surface(g.surface()) {}
@@ -158,7 +61,7 @@ struct GlobeView::State {
   SlotAges::Stale stale;                                       ///< of the last frame
   /// Room for all that can be in flight, so that no worker ever waits on it.
   std::shared_ptr<FinishedQueue> finished;
-  std::shared_ptr<GroundAnswer> ground = std::make_shared<GroundAnswer>();
+  GroundBelow ground;
   std::stop_source stop;
   int in_flight = 0;        ///< parts that workers have
   std::vector<WaitingPart> waiting;
@@ -173,14 +76,17 @@ struct GlobeView::State {
   Clock::time_point created = Clock::now();
   const surface::Selection* selection = nullptr;
   Motion motion;
+  StepsAhead steps;
   std::vector<surface::TileRequest> ahead;  ///< what a later view will want
+  bool transitions = false;                 ///< of the last frame's settings
+  Clock::time_point last_update = created;
   FrameStats stats;
 
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
   void ask(const surface::TileRequest& request);
   bool submit(const geo::TileKey& key, Part part);
   void renew_roots();
-  void show_surface_at(const std::optional<UtcTime>& time);
+  void show_surface_at(const ViewSettings& settings);
   void renew_colours();
   void resume_waiting();
   void order_waiting();
@@ -230,11 +136,12 @@ void GlobeView::State::renew_roots() {
   });
 }
 
-/// From now on the layers show the steps of `time`; what was on its way for the old ones is let go.
-void GlobeView::State::show_surface_at(const std::optional<UtcTime>& time) {
-  auto latest = globe.surface_at(time);
+/// From now on the layers show the steps of the settings' time; what was on its way for the old ones is let go.
+void GlobeView::State::show_surface_at(const ViewSettings& settings) {
+  auto latest = settings.transitions ? steps.at(globe, settings.time, surface) : globe.surface_at(settings.time);
   if (latest == surface) return;
   slots.layers_changed(*surface, *latest);
+  tree.forget_failures(Part::colour);
   surface = std::move(latest);
   std::erase_if(waiting, [&](const WaitingPart& part) {
     if (part.part != Part::colour) return false;
@@ -258,7 +165,7 @@ void GlobeView::State::renew_colours() {
 /// Builds those whose data have come; drops those that no recent frame wanted. Roots are always wanted.
 void GlobeView::State::resume_waiting() {
   std::erase_if(waiting, [&](const WaitingPart& part) {
-    if (*part.missing == 0 && submit(part.key, part.part)) {
+    if (*part.missing == 0 && in_flight < max_in_flight && submit(part.key, part.part)) {
       ++in_flight;
       return true;
     }
@@ -315,7 +222,7 @@ Result<void> GlobeView::State::upload(const Finished& item) {
   for (;;) {
     auto result = item.part == Part::geometry
                       ? renderer->upload_geometry(thread, item.key, std::get<surface::TileGeometry>(item.content))
-                      : renderer->upload_colour(thread, item.key, std::get<surface::TileImagery>(item.content));
+                      : renderer->upload_colour(thread, item.key, std::get<surface::TileImagery>(item.content), transitions);
     if (result || result.error().code != ErrorCode::exhausted || !make_room(item.part)) return result;
   }
 }
@@ -334,16 +241,16 @@ void GlobeView::State::take_over(Finished item) {
     return;
   }
   if (item.key.level == 0 && item.part == Part::geometry && roots_renewing > 0) --roots_renewing;
-  Result<void> result;
-  if (const Error* error = std::get_if<Error>(&item.content)) result = *error;
-  else result = upload(item);
+  const Error* const built_wrong = std::get_if<Error>(&item.content);
+  const Result<void> result = built_wrong != nullptr ? Result<void>(*built_wrong) : upload(item);
   if (!result) {
     const Error& error = result.error();
     if (renews) slots.not_asked(item.key);
-    if (error.code == ErrorCode::cancelled) return tree.cancelled(item.key, item.part);
-    if (error.code == ErrorCode::exhausted) {
-      // More is wanted than fits: want less from now on.
-      max_bytes = std::max(max_bytes - max_bytes / 16, kLeastBytes);
+    const bool of_other_layers = item.part == Part::colour && !current;
+    if (error.code == ErrorCode::cancelled || of_other_layers) return tree.cancelled(item.key, item.part);
+    if (error.code == ErrorCode::exhausted && built_wrong == nullptr) {
+      // More is wanted than fits: want less from now on. What only a later view wants does not count.
+      if (selection == nullptr || selection->stats.tiles_waiting > 0) max_bytes = std::max(max_bytes - max_bytes / 16, kLeastBytes);
       return tree.cancelled(item.key, item.part);
     }
     const bool may_work_later = error.code == ErrorCode::unavailable;
@@ -389,12 +296,15 @@ void GlobeView::State::wait_for_half(Clock::time_point deadline) {
 void GlobeView::State::update(const view::Camera& camera, const ViewSettings& settings, double upload_ms) {
   thread.empty_graveyard();
   const auto start = Clock::now();
+  transitions = settings.transitions;
+  renderer->advance_renewals(thread, transitions ? (start - last_update) / surface::kTransitionTime : 1.0f);
+  last_update = start;
   globe.run_one();
   take_over(upload_ms);
   resume_waiting();
   stats.upload_ms = ms_since(start);
 
-  show_surface_at(settings.time);
+  show_surface_at(settings);
   if (auto latest = globe.facts(); latest != first_facts) {
     first_facts = std::move(latest);
     roots_to_renew = geo::kFaceCount;
@@ -421,6 +331,8 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
       ask(request);
     }
   }
+
+  steps.foresee(globe, settings.time, start, *surface, selection->draw, transitions && selection->requests.empty() && !stale.any);
 
   const surface::SelectionStats& s = selection->stats;
   stats.time = std::chrono::duration<double>(start - created).count();
@@ -609,31 +521,7 @@ std::optional<geo::Point<geo::Ecef>> GlobeView::pick(const view::Camera& camera,
   return camera.eye + geo::Vector<geo::Ecef>{direction * seen.distance.front()};
 }
 
-std::optional<EllipsoidalHeight> GlobeView::ground_below(const view::Camera& camera) {
-  State& s = *state_;
-  auto answer = s.ground;
-  if (!answer->asked.exchange(true)) {
-    const geo::Geodetic eye = geo::to_geodetic(s.globe.ellipsoid(), camera.eye);
-    // From far above the coarse data will do: the finest may have to be fetched.
-    constexpr double kShareOfHeight = 0.01;
-    const double spacing = std::max(eye.height.value, 0.0) * kShareOfHeight;
-    const bool submitted = s.globe.try_submit([answer, place = geo::place_of(eye), spacing, surface = s.globe.surface()](SurfaceWorker& worker) {
-      if (const auto model = worker.elevation(surface)) {
-        const auto height = (*model)->height_at(place, surface::Lookup::bilinear, spacing);
-        answer->awaited.clear();
-        const bool pending = (*model)->take_pending(answer->awaited);
-        if (height && !pending) {
-          answer->metres = height->metres;
-          answer->known = true;
-        }
-      }
-      answer->asked = false;
-    });
-    if (!submitted) answer->asked = false;
-  }
-  if (!answer->known) return std::nullopt;
-  return EllipsoidalHeight(answer->metres);
-}
+std::optional<EllipsoidalHeight> GlobeView::ground_below(const view::Camera& camera) { return state_->ground.find(state_->globe, camera); }
 
 const FrameStats& GlobeView::stats() const { return state_->stats; }
 gpu::RenderThread& GlobeView::thread() { return state_->thread; }

@@ -79,8 +79,4 @@ class GlobeView {
   std::unique_ptr<State> state_;
 };
 
-/// Direction to the light for a camera: the sun at `time`, or without a time the map-maker's light: from the north-west,
-/// 45 degrees high, at the place under the eye.
-geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& camera, const std::optional<UtcTime>& time);
-
 }  // namespace tellurion::globe

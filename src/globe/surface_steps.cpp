@@ -25,6 +25,7 @@ SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<La
     OneLayer layer{info.spec, info.raster, {}};
     if (info.spec.source.time && info.spec.enabled) {
       if (auto times = source::TimeSteps::create(*info.spec.source.time)) layer.timed = TimedLayer{std::move(*times), {}, {}, {}};
+      has_times_ = has_times_ || layer.timed.has_value();
     }
     order_.push_back(layers_.size());
     layers_.push_back(std::move(layer));
@@ -41,13 +42,21 @@ SurfaceSteps::Steps SurfaceSteps::steps_at(const std::optional<UtcTime>& time) c
 
 SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step) {
   TimedLayer& timed = *layer.timed;
-  const auto held = std::ranges::find(timed.open, step, [](const auto& entry) { return entry.first; });
-  if (held != timed.open.end()) {
+  const auto find = [&]() -> std::optional<Source> {
+    const auto held = std::ranges::find(timed.open, step, [](const auto& entry) { return entry.first; });
+    if (held == timed.open.end()) return std::nullopt;
     timed.open.splice(timed.open.begin(), timed.open, held);
     return held->second;
+  };
+  {
+    std::lock_guard lock(mutex_);
+    if (const auto source = find()) return *source;
   }
+  auto opened = open_(spec_of_step(layer.spec, timed.times.text(step)));
+  std::lock_guard lock(mutex_);
+  if (const auto source = find()) return *source;  // another thread was faster
   Source source;
-  if (auto opened = open_(spec_of_step(layer.spec, timed.times.text(step)))) {
+  if (opened) {
     source = std::move(*opened);
   } else {
     if (timed.failures.count++ == 0) log::warning(opened.error().message);
@@ -59,22 +68,34 @@ SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step)
   return source;
 }
 
-std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::optional<UtcTime>& time) {
+std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::held(const Steps& steps) {
+  const auto found = std::ranges::find(surfaces_, steps, [](const auto& entry) { return entry.first; });
+  if (found == surfaces_.end()) return nullptr;
+  surfaces_.splice(surfaces_.begin(), surfaces_, found);
+  return found->second;
+}
+
+std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::held_at(const std::optional<UtcTime>& time) {
   std::lock_guard lock(mutex_);
+  if (!has_times_ && !surfaces_.empty()) return surfaces_.front().second;
+  return held(steps_at(time));
+}
+
+std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::optional<UtcTime>& time) {
   Steps steps = steps_at(time);
-  const auto held = std::ranges::find(surfaces_, steps, [](const auto& entry) { return entry.first; });
-  if (held != surfaces_.end()) {
-    surfaces_.splice(surfaces_.begin(), surfaces_, held);
-    return held->second;
-  }
+  if (auto same = held_at(time)) return same;
+  std::vector<Source> sources;
+  for (std::size_t i = 0; i < layers_.size(); ++i) sources.push_back(layers_[i].timed ? source_of(layers_[i], steps[i]) : layers_[i].fixed);
+  std::lock_guard lock(mutex_);
+  if (auto same = held(steps)) return same;
   auto description = std::make_shared<surface::SurfaceDescription>();
   description->ellipsoid = ellipsoid_;
   description->revision = ++last_revision_;
   for (const std::size_t i : order_) {
-    OneLayer& one = layers_[i];
+    const OneLayer& one = layers_[i];
+    if (!sources[i]) continue;
     surface::Layer layer;
-    layer.source = one.timed ? source_of(one, steps[i]) : one.fixed;
-    if (!layer.source) continue;
+    layer.source = sources[i];
     layer.name = one.spec.name;
     layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : static_cast<std::uint32_t>(i);
     layer.opacity = static_cast<float>(one.spec.opacity);
@@ -89,7 +110,6 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
 }
 
 std::shared_ptr<const source::RasterSource> SurfaceSteps::raster_at(std::size_t layer, const std::optional<UtcTime>& time) {
-  std::lock_guard lock(mutex_);
   OneLayer& one = layers_[layer];
   return one.timed ? source_of(one, one.timed->times.step_at(time)) : one.fixed;
 }

@@ -32,6 +32,8 @@ class SurfaceSteps {
   /// The surface at `time`; without one the last step of each layer. A layer whose source cannot be opened is left out.
   /// The same object for the same steps, as long as it is among the last few that were asked for.
   std::shared_ptr<const surface::SurfaceDescription> at(const std::optional<UtcTime>& time);
+  /// The same, but opens nothing: null if it is not among the last few.
+  std::shared_ptr<const surface::SurfaceDescription> held_at(const std::optional<UtcTime>& time);
 
   /// A layer's source at `time`; null: it has none.
   std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time);
@@ -65,14 +67,17 @@ class SurfaceSteps {
   using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
 
   Steps steps_at(const std::optional<UtcTime>& time) const;
+  /// Opens it if it is not open, without the lock.
   Source source_of(OneLayer& layer, std::int64_t step);
+  std::shared_ptr<const surface::SurfaceDescription> held(const Steps& steps);
 
   geo::Ellipsoid ellipsoid_;
   OpenSource open_;
   std::vector<OneLayer> layers_;
   std::vector<std::size_t> order_;  ///< in which they are drawn
+  bool has_times_ = false;          ///< some layer has
 
-  mutable std::mutex mutex_;        ///< guards what follows, and the timed layers
+  mutable std::mutex mutex_;        ///< guards what follows and what the timed layers have open; never held while a source is opened
   std::uint32_t next_id_ = 0;
   std::uint64_t last_revision_ = 0;
   std::list<std::pair<Steps, std::shared_ptr<const surface::SurfaceDescription>>> surfaces_;  ///< the most recently used first

@@ -21,8 +21,6 @@ namespace {
 
 constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
 
-bool is_service(const std::string& type) { return type == "wmts" || type == "wms" || type == "tms"; }
-
 /// Sources that need neither file nor server.
 bool is_drawn_by_itself(const std::string& type) { return type == "tile-index" || type == "scale"; }
 
@@ -119,7 +117,7 @@ class WorldReader {
     if (source.type == "cesium-terrain") return read_terrain(table, source);
     if (source.type == "cog") return read_cog(table, source);
     if (is_archive(source.type)) return read_archive(table, source);
-    if (is_service(source.type)) return read_service(table, source);
+    if (source.is_service()) return read_service(table, source);
     if (is_drawn_by_itself(source.type)) return read_drawn(table, source);
     const bool image = source.type == "image";
     if (source.type != "gdal" && !image) {
@@ -383,113 +381,6 @@ class WorldReader {
   std::optional<Error> error_;
 };
 
-toml::array array_of(const std::vector<std::string>& texts) {
-  toml::array list;
-  for (const std::string& text : texts) list.push_back(text);
-  return list;
-}
-
-void insert_time(toml::table& table, const SourceSpec& source) {
-  if (!source.time) return;
-  toml::table fields;
-  fields.is_inline(true);
-  fields.insert("format", source.time->format);
-  if (!source.time->values.empty()) fields.insert("values", array_of(source.time->values));
-  if (!source.time->start.empty()) fields.insert("start", source.time->start);
-  if (!source.time->end.empty()) fields.insert("end", source.time->end);
-  if (!source.time->step.empty()) fields.insert("step", source.time->step);
-  table.insert("time", std::move(fields));
-}
-
-toml::array edges_array(const std::array<double, 4>& edges) {
-  toml::array list;
-  for (const double edge : edges) list.push_back(edge);
-  return list;
-}
-
-toml::table texts_table(const std::map<std::string, std::string>& texts) {
-  toml::table table;
-  table.is_inline(true);
-  for (const auto& [name, value] : texts) table.insert(name, value);
-  return table;
-}
-
-/// What source_table has still to say of a WMTS, WMS or TMS.
-void add_service(const SourceSpec& source, toml::table& table) {
-  const ServiceSpec& service = source.service;
-  const bool wms = source.type == "wms";
-  const auto add = [&](const char* key, const std::string& value) {
-    if (!value.empty()) table.insert(key, value);
-  };
-  table.insert("url", source.url);
-  if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
-  add(wms ? "layers" : "layer", service.layer);
-  add(wms ? "styles" : "style", service.style);
-  add("matrix_set", service.matrix_set);
-  add("format", service.format);
-  add("version", service.version);
-  add("crs", source.crs.value_or(""));
-  add("encoding", source.encoding);
-  if (!service.dimensions.empty()) table.insert("dimensions", texts_table(service.dimensions));
-  if (service.transparent) table.insert("transparent", *service.transparent);
-  if (service.min_level) table.insert("min_level", *service.min_level);
-  if (service.max_level) table.insert("max_level", *service.max_level);
-  if (source.tile_size != SourceSpec{}.tile_size) table.insert("tile_size", source.tile_size);
-  if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
-  if (source.vertical) table.insert("vertical", *source.vertical);
-}
-
-toml::table source_table(const SourceSpec& source, const std::filesystem::path& folder) {
-  toml::table table;
-  table.is_inline(true);
-  table.insert("type", source.type);
-  if (is_service(source.type)) {
-    add_service(source, table);
-    return table;
-  }
-  if (source.type == "tile-index") {
-    table.insert("projection", source.projection);
-    table.insert("tile_size", source.tile_size);
-    return table;
-  }
-  if (source.type == "scale") {
-    table.insert("unit", source.unit);
-    return table;
-  }
-  SourceSpec usual;
-  if (source.type == "cesium-terrain") {
-    usual.tile_size = kTerrainSize;
-    usual.max_level = kEveryLevel;
-  }
-  if (!source.url.empty()) {
-    table.insert("url", source.url);
-  } else {
-    const auto relative = source.path.lexically_relative(folder);
-    const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
-    table.insert("path", (inside ? relative : source.path).generic_string());
-  }
-  insert_time(table, source);
-  if (!source.subdomains.empty()) table.insert("subdomains", array_of(source.subdomains));
-  if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));
-  if (!source.table.empty()) table.insert("table", source.table);
-  if (source.projection != usual.projection) table.insert("projection", source.projection);
-  if (!source.encoding.empty()) table.insert("encoding", source.encoding);
-  if (source.tile_size != usual.tile_size) table.insert("tile_size", source.tile_size);
-  if (source.min_level != usual.min_level) table.insert("min_level", source.min_level);
-  if (source.max_level != usual.max_level) table.insert("max_level", source.max_level);
-  if (source.bounds) table.insert("bounds", edges_array(*source.bounds));
-  if (source.crs) table.insert("crs", *source.crs);
-  if (source.vertical) table.insert("vertical", *source.vertical);
-  if (source.no_data) table.insert("no_data", *source.no_data);
-  if (source.scale) table.insert("scale", *source.scale);
-  if (source.offset) table.insert("offset", *source.offset);
-  if (source.bands) {
-    const auto& b = *source.bands;
-    table.insert("bands", toml::array{b[0], b[1], b[2]});
-  }
-  return table;
-}
-
 }  // namespace
 
 std::string_view name_of(LayerGroup group) { return kGroupNames[static_cast<std::size_t>(group)]; }
@@ -519,47 +410,6 @@ Result<World> load_world(const std::filesystem::path& file) {
   auto world = parse_world(text.str(), absolute.parent_path(), file.string());
   if (world) world->file = absolute;
   return world;
-}
-
-std::string to_toml(const World& world) {
-  toml::table planet;
-  planet.insert("name", world.planet);
-  const auto body = geo::find_body(world.planet);
-  if (!body || !(body->ellipsoid == world.ellipsoid))
-    planet.insert("radii", toml::array{world.ellipsoid.a(), world.ellipsoid.b()});
-  toml::array layers;
-  for (const LayerSpec& layer : world.layers) {
-    toml::table table;
-    table.insert("name", layer.name);
-    table.insert("group", std::string(name_of(layer.group)));
-    table.insert("source", source_table(layer.source, world.file.parent_path()));
-    if (layer.opacity != 1.0) table.insert("opacity", layer.opacity);
-    if (layer.gamma != 1.0) table.insert("gamma", layer.gamma);
-    if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
-    if (!layer.enabled) table.insert("enabled", false);
-    if (layer.adds) table.insert("mode", "add");
-    if (!layer.attribution.empty()) table.insert("attribution", layer.attribution);
-    layers.push_back(std::move(table));
-  }
-  std::ostringstream out;
-  out << toml::table{{"planet", std::move(planet)}, {"layer", std::move(layers)}} << "\n";
-  return out.str();
-}
-
-Result<void> save_world(const World& world, const std::filesystem::path& file) {
-  World placed = world;
-  std::error_code failure;
-  placed.file = std::filesystem::absolute(file, failure);
-  const std::filesystem::path part = file.string() + ".part";
-  {
-    std::ofstream stream(part, std::ios::binary);
-    stream << to_toml(placed);
-    if (!stream.flush())
-      return Error{ErrorCode::unavailable, fmt::format("{}: cannot be written; is the folder there and writable?", file.string())};
-  }
-  std::filesystem::rename(part, file, failure);
-  if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", file.string(), failure.message())};
-  return {};
 }
 
 Result<std::filesystem::path> default_data_folder() {

@@ -64,6 +64,8 @@ struct SourceSpec {
   std::string table;                        ///< of a GeoPackage; empty: the only one
 
   ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like
+
+  bool is_service() const { return type == "wmts" || type == "wms" || type == "tms"; }
 };
 
 struct LayerSpec {

@@ -112,9 +112,14 @@ Result<void> Renderer::upload_geometry(gpu::RenderThread& thread, const geo::Til
 }
 
 Result<void> Renderer::upload_colour(gpu::RenderThread& thread, const geo::TileKey& key,
-                                     const surface::TileImagery& imagery) {
+                                     const surface::TileImagery& imagery, bool fades) {
   thread.check();
-  return state_->store.upload_colour(thread, key, imagery);
+  return state_->store.upload_colour(thread, key, imagery, fades);
+}
+
+void Renderer::advance_renewals(gpu::RenderThread& thread, float share) {
+  thread.check();
+  state_->store.advance_renewals(share);
 }
 
 void Renderer::release(gpu::RenderThread& thread, const geo::TileKey& key, surface::Part part) {

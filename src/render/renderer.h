@@ -72,7 +72,10 @@ class Renderer {
 
   // Residency. An upload that does not fit gives `exhausted`: release something first.
   Result<void> upload_geometry(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileGeometry& geometry);
-  Result<void> upload_colour(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileImagery& imagery);
+  /// `fades`: a slot that is there is faded over, as advance_renewals goes on, if there is room for both.
+  Result<void> upload_colour(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileImagery& imagery, bool fades = false);
+  /// Goes on with such fades by this share of the whole.
+  void advance_renewals(gpu::RenderThread& thread, float share);
   void release(gpu::RenderThread& thread, const geo::TileKey& key, surface::Part part);
   std::size_t gpu_bytes() const;             ///< resident tiles, targets and pools in use
   std::size_t gpu_budget_bytes() const;

@@ -139,8 +139,10 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     if (!resident || !resident->mesh) continue;
     ResidentMesh& mesh = *resident->mesh;
 
+    const auto colour_owner = tile.colour_owner == tile.key ? resident : store.find(tile.colour_owner);
     const bool fades = tile.fade < 1.0f && tile.colour_before != tile.colour_owner;
-    const gpu::LinkedProgram* program = fades ? *fading : *plain;
+    const bool renews = !fades && colour_owner && colour_owner->colour_before;
+    const gpu::LinkedProgram* program = fades || renews ? *fading : *plain;
     if (program != in_use) {
       glUseProgram(program->program.name());
       in_use = program;
@@ -149,7 +151,6 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
     const glm::vec3 upper(offset);
     const glm::vec3 lower(offset - glm::dvec3(upper));
-    const auto colour_owner = tile.colour_owner == tile.key ? resident : store.find(tile.colour_owner);
     const auto slope_owner = tile.slope_owner == tile.key ? resident : store.find(tile.slope_owner);
     const auto colour = store.colour_of(colour_owner);
     const auto slopes = store.slopes_of(slope_owner);
@@ -161,12 +162,13 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     u.v[4] = slot_place(tile.key, tile.colour_owner, surface::kColourSlotSide, surface::kColourGutter, colour.layer);
     u.v[5] = slot_place(tile.key, tile.slope_owner, surface::kSlopeSlotSide, surface::kSlopeGutter, slopes.layer);
     u.v[6] = u.v[4];
-    u.v[7] = glm::vec4(tile.fade, tile.sink_depth, tile.sink_level, 0);
+    u.v[7] = glm::vec4(renews ? colour_owner->renewal : tile.fade, tile.sink_depth, tile.sink_level, 0);
     bind(0, colour.texture);
     bind(1, slopes.texture);
-    if (fades) {
-      const auto before = store.colour_of(store.find(tile.colour_before));
-      u.v[6] = slot_place(tile.key, tile.colour_before, surface::kColourSlotSide, surface::kColourGutter, before.layer);
+    if (fades || renews) {
+      const geo::TileKey before_owner = renews ? tile.colour_owner : tile.colour_before;
+      const auto before = renews ? store.colour_before_of(*colour_owner) : store.colour_of(store.find(before_owner));
+      u.v[6] = slot_place(tile.key, before_owner, surface::kColourSlotSide, surface::kColourGutter, before.layer);
       bind(2, before.texture);
     }
     glUniform4fv(program->locations[0], kTileVectors, &u.v[0].x);

@@ -1,5 +1,6 @@
 #include "render/tile_store.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include <epoxy/gl.h>
@@ -118,9 +119,17 @@ void TileStore::upload_slopes(Slot slot, const surface::SlopeMap& map) {
 }
 
 Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::TileKey& key,
-                                      const surface::TileImagery& imagery) {
+                                      const surface::TileImagery& imagery, bool fades) {
   const auto known = tiles_.find(key);
   std::optional<Slot> slot = known == tiles_.end() ? std::nullopt : known->second.colour;
+  if (slot && fades && !known->second.colour_before) {
+    if (const auto fresh = colours_.acquire(thread, budget_)) {
+      known->second.colour_before = slot;
+      known->second.renewal = 0;
+      if (std::ranges::find(renewed_, key) == renewed_.end()) renewed_.push_back(key);
+      slot = fresh;
+    }
+  }
   if (!slot) slot = colours_.acquire(thread, budget_);
   if (!slot && slopes_.give_back(budget_)) slot = colours_.acquire(thread, budget_);
   if (!slot) {
@@ -135,6 +144,19 @@ Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::Tile
   return {};
 }
 
+void TileStore::advance_renewals(float share) {
+  std::erase_if(renewed_, [&](const geo::TileKey& key) {
+    const auto found = tiles_.find(key);
+    if (found == tiles_.end() || !found->second.colour_before) return true;
+    ResidentTile& tile = found->second;
+    tile.renewal += share;
+    if (tile.renewal < 1) return false;
+    colours_.release(*tile.colour_before);
+    tile.colour_before.reset();
+    return true;
+  });
+}
+
 void TileStore::release(const geo::TileKey& key, surface::Part part) {
   const auto found = tiles_.find(key);
   if (found == tiles_.end()) return;
@@ -144,8 +166,10 @@ void TileStore::release(const geo::TileKey& key, surface::Part part) {
     if (tile.slopes) slopes_.release(*tile.slopes);
     tile.slopes.reset();
   } else {
-    if (tile.colour) colours_.release(*tile.colour);
-    tile.colour.reset();
+    for (auto* slot : {&tile.colour, &tile.colour_before}) {
+      if (*slot) colours_.release(**slot);
+      slot->reset();
+    }
   }
   if (!tile.mesh && !tile.colour) tiles_.erase(found);
 }
@@ -158,6 +182,10 @@ const ResidentTile* TileStore::find(const geo::TileKey& key) const {
 TileStore::Layer TileStore::colour_of(const ResidentTile* tile) const {
   if (!tile || !tile->colour) return {no_colour_.name(), 0};
   return {colours_.texture(*tile->colour), static_cast<float>(tile->colour->layer)};
+}
+
+TileStore::Layer TileStore::colour_before_of(const ResidentTile& tile) const {
+  return {colours_.texture(*tile.colour_before), static_cast<float>(tile.colour_before->layer)};
 }
 
 TileStore::Layer TileStore::slopes_of(const ResidentTile* tile) const {

@@ -21,6 +21,8 @@ struct ResidentTile {
   std::optional<Slot> slopes;
   glm::dvec3 tangent{1.0, 0.0, 0.0};  ///< of the slopes
   std::optional<Slot> colour;
+  std::optional<Slot> colour_before;  ///< what `colour` replaces, until it has faded in
+  float renewal = 1.0f;               ///< share of `colour` over it
 };
 
 class TileStore {
@@ -35,7 +37,10 @@ class TileStore {
 
   /// Errors: exhausted. A part that is there already is replaced.
   Result<void> upload_geometry(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileGeometry& geometry);
-  Result<void> upload_colour(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileImagery& imagery);
+  /// `fades`: over what was there, if there is room for both, as advance_renewals goes on.
+  Result<void> upload_colour(gpu::RenderThread& thread, const geo::TileKey& key, const surface::TileImagery& imagery, bool fades = false);
+  /// Goes on with all that fades, by this share of the whole.
+  void advance_renewals(float share);
   void release(const geo::TileKey& key, surface::Part part);
 
   /// Nothing if no part of the tile is there.
@@ -48,6 +53,7 @@ class TileStore {
   };
   /// The slot of `tile`, or an empty one (transparent; flat) if it has none.
   Layer colour_of(const ResidentTile* tile) const;
+  Layer colour_before_of(const ResidentTile& tile) const;
   Layer slopes_of(const ResidentTile* tile) const;
 
   Budget& budget() { return budget_; }
@@ -68,6 +74,7 @@ class TileStore {
   gpu::Texture no_slope_;
   std::unordered_map<geo::TileKey, ResidentTile> tiles_;
   std::vector<glm::vec2> slope_level_;
+  std::vector<geo::TileKey> renewed_;  ///< that have a colour_before
   std::uint64_t bytes_uploaded_ = 0;
 };
 

@@ -122,4 +122,12 @@ void NodePool::prune(FrameNumber frame, TimePoint now) {
   }
 }
 
+void NodePool::forget_failures(Part part) {
+  const auto forget = [&](Node& node) {
+    if (std::holds_alternative<Failed>(node.part(part).life)) node.part(part).life = Wanted{};
+  };
+  std::ranges::for_each(roots_, forget);
+  for (Quad& quad : quads_) std::ranges::for_each(quad.nodes, forget);
+}
+
 }  // namespace tellurion::surface

@@ -138,6 +138,8 @@ class NodePool {
   /// retried. Looks at a bounded number of them per call, in turn.
   void prune(FrameNumber frame, TimePoint now);
 
+  void forget_failures(Part part);
+
  private:
   struct Quad {
     std::array<Node, 4> nodes;

@@ -28,19 +28,20 @@ const Outlook::Block* foretold(const Node& node) {
 }
 
 /// Where facts only assume, a tile of every third level is built before anything below it is asked for: its outlook tells what.
-/// One that cannot be built leaves that to those above it.
+/// One that can never be built leaves that to those above it.
 bool waits_for_outlook(const Node& node) {
+  const auto* failed = std::get_if<Failed>(&node.part(Part::geometry).life);
   return node.facts.assumed && node.key.level % kOutlookLevels == 0 && !(node.built && node.built->metrics.outlook) &&
-         !std::holds_alternative<Failed>(node.part(Part::geometry).life);
+         !(failed != nullptr && failed->retry_at == TimePoint::max());
 }
 
-/// Bounds of the displayed heights: the outlook's before the facts', if there is one. Where facts give no error a tile is judged
-/// once it has been built, and then by its own range; cut to that before, so that what was culled before it arrived is culled
-/// after.
+/// Bounds of the displayed heights: the outlook's, if there is one. Where there is none and facts give no error either, a tile is
+/// judged once it has been built, and then by its own range; cut to that before, so that what was culled before it arrived is
+/// culled after.
 HeightRange heights_of(const Node& node, const Outlook::Block* outlook, double exaggeration) {
   double lowest = outlook != nullptr ? outlook->min_height : node.facts.min_height;
   double highest = outlook != nullptr ? outlook->max_height : node.facts.max_height;
-  if (node.built && !node.facts.height_error) {
+  if (node.built && !node.facts.height_error && outlook == nullptr) {
     const double low = node.built->metrics.min_height, high = node.built->metrics.max_height;
     lowest = std::clamp(low, lowest, highest);
     highest = std::clamp(high, lowest, highest);

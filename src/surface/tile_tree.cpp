@@ -11,12 +11,6 @@
 #include "surface/selection_wanted.h"
 
 namespace tellurion::surface {
-namespace {
-
-constexpr std::chrono::duration<float> kTransitionTime{0.3f};
-
-}  // namespace
-
 struct TileTree::State {
   State(const geo::Ellipsoid& ellipsoid, std::shared_ptr<const SurfaceFacts> facts) : pool(ellipsoid, std::move(facts)) {
     selection.stats.selected_by_level.reserve(geo::kMaxTileLevel + 1);
@@ -116,6 +110,8 @@ void TileTree::failed(const geo::TileKey& key, Part part, std::chrono::steady_cl
 void TileTree::released(const geo::TileKey& key, Part part) {
   state_->happens(state_->pool.at(key), part, Release{});
 }
+
+void TileTree::forget_failures(Part part) { state_->pool.forget_failures(part); }
 
 bool TileTree::is_wanted(const geo::TileKey& key, Part part) const {
   const Node* node = state_->pool.find(key);

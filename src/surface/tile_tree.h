@@ -64,6 +64,9 @@ struct Selection {
 /// What a tile takes on the GPU: its mesh, and the slots of its own that its facts tell of, colour with mips.
 std::size_t bytes_of_tile(const TileFacts& facts, std::size_t mesh_bytes);
 
+/// How long a fade or morph takes.
+inline constexpr std::chrono::duration<float> kTransitionTime{0.3f};
+
 class TileTree {
  public:
   TileTree(const geo::Ellipsoid& ellipsoid, std::shared_ptr<const SurfaceFacts> facts);
@@ -90,6 +93,8 @@ class TileTree {
   void arrived_colour(const geo::TileKey& key);
   void failed(const geo::TileKey& key, Part part, std::chrono::steady_clock::time_point retry_at);
   void released(const geo::TileKey& key, Part part);
+  /// Parts of this kind that failed are wanted again: what they are built from has changed.
+  void forget_failures(Part part);
 
   /// Whether a started request is still of use (asked again by one of the last frames); a loader may drop it if not.
   bool is_wanted(const geo::TileKey& key, Part part) const;

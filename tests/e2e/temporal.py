@@ -1,15 +1,14 @@
 """Layers with times: what is shown is what the step's own file or tiles show."""
 # label: slow
 # timeout: 900
-import http.server
 import re
-import threading
 import unittest
 
 import numpy as np
 from osgeo import gdal
 
 from _common import Case, shared
+from _servers import Reply, Server, picture_bytes
 
 LANDSAT = "earth/temporal"
 YEARS = ["1985", "1995", "2005", "2015", "2020"]
@@ -66,38 +65,42 @@ class Temporal(Case):
     def test_tiles_of_a_step_are_asked_for_by_its_time(self):
         asked = []
 
-        class Handler(http.server.BaseHTTPRequestHandler):
-            def do_GET(self):
-                asked.append(self.path)
-                day = int(re.match(r"/(\d+)-\d+-(\d+)/", self.path).group(2))
-                tile = gdal.GetDriverByName("MEM").Create("", 256, 256, 3)
-                for band in range(3):
-                    tile.GetRasterBand(band + 1).Fill(day * 20 if band == 0 else 40)
-                gdal.GetDriverByName("PNG").CreateCopy("/vsimem/tile.png", tile)
-                file = gdal.VSIFOpenL("/vsimem/tile.png", "rb")
-                body = gdal.VSIFReadL(1, 10**6, file)
-                gdal.VSIFCloseL(file)
-                self.send_response(200)
-                self.send_header("Content-Length", str(len(body)))
-                self.end_headers()
-                self.wfile.write(bytes(body))
+        class Daily(Server):
+            def answer(self, path, headers):
+                day = int(re.match(r"/(\d+)-\d+-(\d+)/", path).group(2))
+                with self.lock:
+                    asked.append(path)
+                return Reply(200, picture_bytes([np.full((256, 256), value) for value in (day * 20, 40, 40)]))
 
-            def log_message(self, *_):
-                pass
-
-        server = http.server.HTTPServer(("127.0.0.1", 0), Handler)  # one request at a time: GDAL's memory files have one name
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        world = self.world("daily", f'{{ type = "xyz", url = "http://127.0.0.1:{server.server_port}/{{time}}/{{z}}/{{x}}/{{y}}.png", max_level = 3, '
-                                    'time = { format = "%Y-%m-%d", start = "2020-01-01", end = "2020-01-10", step = "P1D" } }')
-        try:
+        with Daily() as server:
+            world = self.world("daily", f'{{ type = "xyz", url = "{server.base}/{{time}}/{{z}}/{{x}}/{{y}}.png", max_level = 3, '
+                                        'time = { format = "%Y-%m-%d", start = "2020-01-01", end = "2020-01-10", step = "P1D" } }')
             for day in (3, 7):
                 asked.clear()
                 picture = self.render(world, (0, 0, 20e6, 0, -90), *self.small, "--time", f"2020-01-{day:02}T12:00Z", name=f"day{day}")
                 self.assertEqual({path.split("/")[1] for path in asked}, {f"2020-01-{day:02}"})
                 self.assertEqual(pixels(picture)[0, 120, 160], day * 20)
-        finally:
-            server.shutdown()
-            server.server_close()
+
+    def test_the_next_step_is_fetched_before_it_is_shown(self):
+        asked = []
+
+        class Daily(Server):
+            def answer(self, path, headers):
+                with self.lock:
+                    asked.append(path.split("/")[1])
+                return Reply(200, picture_bytes(np.full((3, 256, 256), 90)))
+
+        flight = self.folder / "stand.csv"
+        flight.write_text("time,lat,lon,height,heading,pitch,roll\n0,0,0,20000000,0,-90,0\n5,0,0,20000000,0,-90,0\n")
+        with Daily() as server:
+            world = self.world("ahead", f'{{ type = "xyz", url = "{server.base}/{{time}}/{{z}}/{{x}}/{{y}}.png", max_level = 3, '
+                                        'time = { format = "%Y-%m-%d", start = "2020-01-01", end = "2020-01-10", step = "P1D" } }')
+            # Three hours a second: after five seconds it is still the third.
+            self.tellurion("fly", world, flight, "--realtime", "--stats", self.folder / "ahead.json", *self.small, "--time", "2020-01-03T00:00Z", "--clock-rate", 10800)
+            self.assertEqual(set(asked), {"2020-01-03"})
+            asked.clear()
+            self.tellurion("fly", world, flight, "--realtime", "--stats", self.folder / "ahead.json", *self.small, "--time", "2020-01-03T07:00Z", "--clock-rate", 10800)
+        self.assertEqual(set(asked), {"2020-01-04"}, "the third is in the cache, the fourth comes before it is shown")
 
     def test_a_step_whose_file_is_missing_is_said(self):
         world = self.world("gap", f'{{ path = "{shared(LANDSAT)}/landsat_{{time}}.tif", time = {{ values = ["1985", "1990"], format = "%Y" }} }}')

@@ -61,6 +61,16 @@ TEST_CASE("SurfaceSteps: the step that holds is shown, and opened once") {
   CHECK(made.steps.text_of(1, utc("2001-01-01")).empty());
 }
 
+TEST_CASE("SurfaceSteps: held_at gives what was asked for lately and opens nothing") {
+  Steps made;
+  CHECK(made.steps.held_at(utc("2000-01-01")) == nullptr);
+  CHECK(made.opened.empty());
+  const auto first = made.steps.at(utc("2000-01-01"));
+  CHECK(made.steps.held_at(utc("2005-01-01")) == first);
+  CHECK(made.steps.held_at(utc("2020-01-01")) == nullptr);
+  CHECK(made.opened.size() == 1);
+}
+
 TEST_CASE("SurfaceSteps: a step that cannot be opened is left out and told of") {
   Steps made;
   CHECK(made.steps.failures_of(0).count == 0);

@@ -346,6 +346,32 @@ TEST_CASE("upload: a part that is there already is replaced") {
   CHECK(std::abs(c[0] - 204) <= 1);
 }
 
+TEST_CASE("upload: new colours fade over those that were there, and then these are gone") {
+  Stage stage(gpu::Api::core);
+  const geo::TileKey key{};
+  REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, exact_geometry(geo::kWgs84, key, flat)).has_value());
+  const auto colour = [](double v) { return [v](const geo::Vector<geo::Ecef>&) { return glm::dvec3(v); }; };
+  const DrawTile tile = draw_alone(key);
+  const auto shown = [&] { return pixel(stage.picture(camera_at("0,0,1000000"), bare_look(), {&tile, 1}), kWidth / 2, kHeight / 2)[0]; };
+  REQUIRE(stage.renderer->upload_colour(*stage.thread, key, exact_imagery(key, colour(0.2)), true).has_value());
+  CHECK(std::abs(shown() - 51) <= 1);  // there was nothing to fade from
+  REQUIRE(stage.renderer->upload_colour(*stage.thread, key, exact_imagery(key, colour(0.8)), true).has_value());
+  CHECK(std::abs(shown() - 51) <= 1);
+  const std::size_t free_slots = stage.renderer->colour_slots_free();
+  stage.renderer->advance_renewals(*stage.thread, 0.5f);
+  CHECK(std::abs(shown() - 128) <= 2);
+  stage.renderer->advance_renewals(*stage.thread, 0.6f);
+  CHECK(std::abs(shown() - 204) <= 1);
+  CHECK(stage.renderer->colour_slots_free() == free_slots + 1);
+  // Without a fade, and when the tile goes in the middle of one, nothing is left behind.
+  REQUIRE(stage.renderer->upload_colour(*stage.thread, key, exact_imagery(key, colour(0.4))).has_value());
+  CHECK(std::abs(shown() - 102) <= 1);
+  REQUIRE(stage.renderer->upload_colour(*stage.thread, key, exact_imagery(key, colour(0.2)), true).has_value());
+  stage.renderer->release(*stage.thread, key, surface::Part::colour);
+  CHECK(stage.renderer->colour_slots_free() == free_slots + 2);
+  stage.renderer->advance_renewals(*stage.thread, 0.5f);
+}
+
 TEST_CASE("draw: lines, boxes, borders and smooth edges show, and go again") {
   for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
     Stage stage(api, without);
