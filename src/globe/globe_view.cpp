@@ -25,6 +25,7 @@ using surface::Part;
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::chrono::seconds kPause{1};  ///< before a part that failed is asked for again
+constexpr std::chrono::seconds kPauseWithout{5};  ///< the same if it is shown without what failed
 constexpr std::chrono::seconds kPatience{16};  ///< with failures, while nothing arrives: six attempts of a file
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
@@ -44,6 +45,16 @@ struct Finished {
 };
 
 using FinishedQueue = BoundedQueue<Finished>;
+
+/// What a colour part was composed without, ascending.
+std::vector<std::uint32_t> missing_layers(const Finished& item) {
+  std::vector<std::uint32_t> ids;
+  if (const auto* imagery = std::get_if<surface::TileImagery>(&item.content)) {
+    for (const surface::MissingLayer& layer : imagery->missing) ids.push_back(layer.source_id);
+  }
+  std::ranges::sort(ids);
+  return ids;
+}
 
 }  // namespace
 
@@ -97,6 +108,7 @@ struct GlobeView::State {
   Result<void> upload(const Finished& item);
   bool make_room(Part part);
   void note_progress();
+  Clock::time_point note_failure(const Error& error, std::chrono::seconds pause);
   bool has_given_up();
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
   Result<void> load_roots();
@@ -241,7 +253,9 @@ void GlobeView::State::take_over(Finished item) {
     return;
   }
   if (item.key.level == 0 && item.part == Part::geometry && roots_renewing > 0) --roots_renewing;
-  const Error* const built_wrong = std::get_if<Error>(&item.content);
+  const Error* built_wrong = std::get_if<Error>(&item.content);
+  const std::vector<std::uint32_t> missing = missing_layers(item);
+  if (!missing.empty() && !slots.may_lack(item.key, missing)) built_wrong = &std::get<surface::TileImagery>(item.content).missing.front().error;
   const Result<void> result = built_wrong != nullptr ? Result<void>(*built_wrong) : upload(item);
   if (!result) {
     const Error& error = result.error();
@@ -253,20 +267,20 @@ void GlobeView::State::take_over(Finished item) {
       if (selection == nullptr || selection->stats.tiles_waiting > 0) max_bytes = std::max(max_bytes - max_bytes / 16, kLeastBytes);
       return tree.cancelled(item.key, item.part);
     }
-    const bool may_work_later = error.code == ErrorCode::unavailable;
-    failed_in_vain = failed_in_vain || may_work_later;
-    if (may_work_later && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.insert_or_assign(item.key, Clock::now() + kPause);
-    const auto retry_at = may_work_later ? Clock::now() + kPause : Clock::time_point::max();
+    const auto retry_at = note_failure(error, kPause);
+    if (retry_at != Clock::time_point::max() && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.insert_or_assign(item.key, retry_at);
     if (renews) slots.failed(item.key, retry_at);
     return tree.failed(item.key, item.part, retry_at);
   }
-  note_progress();
   if (item.part == Part::geometry) {
+    note_progress();
     const auto& geometry = std::get<surface::TileGeometry>(item.content);
     tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
-  } else {
-    tree.arrived_colour(item.key);
+  } else if (tree.arrived_colour(item.key); missing.empty()) {
+    note_progress();
     slots.composed(item.key, current);
+  } else {
+    slots.composed_without(item.key, missing, note_failure(std::get<surface::TileImagery>(item.content).missing.front().error, kPauseWithout));
   }
 }
 
@@ -353,6 +367,13 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.draws = 0;
   stats.triangles = 0;
   stats.frame_ms = ms_since(start);
+}
+
+/// When what failed so may be asked for again.
+Clock::time_point GlobeView::State::note_failure(const Error& error, std::chrono::seconds pause) {
+  if (error.code != ErrorCode::unavailable) return Clock::time_point::max();
+  failed_in_vain = true;
+  return Clock::now() + pause;
 }
 
 void GlobeView::State::note_progress() {

@@ -31,6 +31,16 @@ void SlotAges::layers_changed(const surface::SurfaceDescription& before, const s
   }
 }
 
+bool SlotAges::may_lack(const geo::TileKey& key, const std::vector<std::uint32_t>& missing) const {
+  if (const auto own = slots_.find(key); own != slots_.end())
+    return own->second.missing.size() > missing.size() && std::ranges::includes(own->second.missing, missing);
+  for (int level = key.level; level-- > 0;) {
+    const auto above = slots_.find(geo::ancestor(key, level));
+    if (above != slots_.end()) return std::ranges::includes(above->second.missing, missing);
+  }
+  return true;
+}
+
 SlotAges::Stale SlotAges::find(std::span<const surface::DrawTile> drawn, TimePoint now) {
   ++frame_;
   Stale stale;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "geo/tile_key.h"
@@ -20,7 +21,13 @@ class SlotAges {
 
   bool holds(const geo::TileKey& key) const { return slots_.contains(key); }
   /// A slot was composed; `current`: of the layers as they are now.
-  void composed(const geo::TileKey& key, bool current) { slots_[key] = Slot{!current}; }
+  void composed(const geo::TileKey& key, bool current) { slots_[key] = Slot{.stale = !current}; }
+  /// The same without these layers (numbers of their sources, ascending): old from the start, and asked for again at `retry_at`.
+  void composed_without(const geo::TileKey& key, std::vector<std::uint32_t> missing, TimePoint retry_at) {
+    slots_[key] = Slot{true, false, 0, retry_at, std::move(missing)};
+  }
+  /// Whether the slot is better composed without these layers than left as it is: what is shown there now has no more.
+  bool may_lack(const geo::TileKey& key, const std::vector<std::uint32_t>& missing) const;
   void released(const geo::TileKey& key) { slots_.erase(key); }
 
   /// Slots that a layer touches whose source has changed show old data from now on.
@@ -46,6 +53,7 @@ class SlotAges {
     bool asked = false;
     std::uint64_t shown = 0;  ///< frame that showed it stale last
     TimePoint retry_at{};
+    std::vector<std::uint32_t> missing{};  ///< layers that it was composed without
   };
   void set_asked(const geo::TileKey& key, bool on);
 

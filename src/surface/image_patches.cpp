@@ -264,6 +264,7 @@ bool ColourModel::take_pending(source::Awaited& awaited) {
 
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
   std::vector<ImagePatch> from_the_top;
+  std::vector<MissingLayer> missing;
   bool pending = false;
   for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
     const Layer& settings = *layer->settings;
@@ -279,7 +280,11 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
         pending = true;  // taken for opaque: what lies below is asked for once it shows
         continue;
       }
-      if (!patch) return patch.error();
+      if (!patch) {
+        missing.push_back({settings.source_id, patch.error()});
+        hides_all_below = false;
+        break;
+      }
       if (patch->image.rgba.empty()) {
         hides_all_below = false;
         continue;
@@ -296,6 +301,7 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
   if (pending) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
   TileImagery imagery;
   imagery.patches.assign(std::make_move_iterator(from_the_top.rbegin()), std::make_move_iterator(from_the_top.rend()));
+  imagery.missing = std::move(missing);
   return imagery;
 }
 

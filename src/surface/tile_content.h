@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "base/result.h"
 #include "geo/frames.h"
 #include "geo/tile_key.h"
 #include "raster/image.h"
@@ -125,8 +126,15 @@ struct ImagePatch {
   float multiplier = 1.0f;
 };
 
+/// A layer that could not be read: the tile is composed of the others.
+struct MissingLayer {
+  std::uint32_t source_id = 0;
+  Error error;
+};
+
 struct TileImagery {
   std::vector<ImagePatch> patches;
+  std::vector<MissingLayer> missing;
   std::size_t bytes() const {
     std::size_t sum = 0;
     for (const ImagePatch& p : patches) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);

@@ -9,7 +9,7 @@ import unittest
 import numpy as np
 from osgeo import gdal
 
-from _common import ETOPO5, SHARED, Case, read_geo, shared
+from _common import ETOPO5, SHARED, Case, read_geo, read_picture, shared
 from _servers import NIGHT, RAINIER_TILES, TERRARIUM, TileServer
 
 
@@ -141,13 +141,20 @@ class Tiles(Case):
         self.assertIn("{y}", done.stderr)
         done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", self.folder / "x.png", "--timeout", 8, status=3)
         self.assertIn("is the server there", done.stderr)
-        # Without a limit it gives up by itself.
-        done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", self.folder / "x.png", status=3, timeout=60)
-        self.assertIn("some data could not be read", done.stderr)
         with TileServer() as server:
             done = self.tellurion("render", self.night(server, "max_level = 4, tile_size = 512"), "--out", self.folder / "x.png",
                                   "--timeout", 8, status=3)
             self.assertIn("tile_size", done.stderr)
+
+    def test_a_server_that_is_not_there_leaves_the_rest_of_the_world(self):
+        view = ("--camera", "20,30,12000000,0,-90", "--no-atmosphere", "--size", "640x360")
+        plain, over = self.folder / "plain.png", self.folder / "over.png"
+        self.tellurion("render", "--out", plain, *view)
+        # It gives up by itself, long before the time-out.
+        done = self.tellurion("render", "http://127.0.0.1:9/{z}/{x}/{y}.png", "--out", over, *view, status=3, timeout=60)
+        self.assertIn("some data could not be read", done.stderr)
+        self.assertGreater(np.std(read_picture(plain)), 30)
+        self.assertLess(np.mean(np.abs(read_picture(plain).astype(float) - read_picture(over))), 1)
 
 
 if __name__ == "__main__":

@@ -114,3 +114,25 @@ TEST_CASE("SlotAges: slots that a changed layer touches are composed anew, once,
   for (int frame = 0; frame < 5; ++frame) slots.find({}, start);
   CHECK_FALSE(slots.is_wanted(root));
 }
+
+TEST_CASE("SlotAges: a slot lacks a layer only where nothing that is shown has it") {
+  const geo::TileKey root{0, 0, 0, 0}, child{0, 1, 0, 0}, grandchild{0, 2, 0, 0};
+  const std::vector<surface::DrawTile> drawn{{.key = root, .colour_owner = root, .colour_before = root, .slope_owner = root}};
+  const SlotAges::TimePoint start{};
+  SlotAges slots;
+  CHECK(slots.may_lack(root, {3}));
+  slots.composed_without(root, {3, 5}, start + std::chrono::seconds(5));
+  CHECK(slots.may_lack(grandchild, {3}));
+  CHECK(slots.may_lack(grandchild, {3, 5}));
+  CHECK_FALSE(slots.may_lack(grandchild, {4}));
+  CHECK(slots.may_lack(root, {5}));
+  CHECK_FALSE(slots.may_lack(root, {3, 5}));
+  slots.composed(child, true);
+  CHECK_FALSE(slots.may_lack(grandchild, {3}));
+  // It is old, and asked for again in time.
+  CHECK(slots.find(drawn, start).any);
+  CHECK(slots.find(drawn, start + std::chrono::seconds(4)).to_ask.empty());
+  CHECK(slots.find(drawn, start + std::chrono::seconds(5)).to_ask == std::vector{root});
+  slots.composed(root, true);
+  CHECK_FALSE(slots.find(drawn, start).any);
+}

@@ -303,3 +303,13 @@ TEST_CASE("build_imagery: layers keep their order and settings; one that hides a
   top.enabled = false;
   CHECK(Pictures({below, middle, top}).of(key).patches.size() == 2);
 }
+
+TEST_CASE("build_imagery: a layer that cannot be read is named, and the others are there, those below it too") {
+  MadeRaster white = normals_picture(512), broken = normals_picture(512);
+  broken.broken = true;
+  const TileImagery imagery = Pictures({layer_of(white, 1), layer_of(broken, 2)}).of({0, 2, 1, 1});
+  CHECK(imagery.patches.size() == 1);
+  REQUIRE(imagery.missing.size() == 1);
+  CHECK(imagery.missing[0].source_id == 2);
+  CHECK(imagery.missing[0].error.code == ErrorCode::unavailable);
+}

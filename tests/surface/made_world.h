@@ -33,6 +33,7 @@ struct MadeRaster {
   std::function<float(int, int)> metres = [](int, int) { return 0.0f; };
   std::function<std::array<std::uint8_t, 4>(int, int)> colour = [](int, int) { return std::array<std::uint8_t, 4>{255, 255, 255, 255}; };
   std::string revision = "1";
+  bool broken = false;  ///< its colours cannot be read
 };
 
 /// Says yes for every tile; the tests' planets are small in number of tiles.
@@ -98,6 +99,7 @@ class MadeSource final : public source::RasterSource, public source::Coverage {
       return grid;
     }
     Result<raster::Image> read_colours(int level, const source::PixelWindow& w) override {
+      if (made_.broken) return Error{ErrorCode::unavailable, "made: broken"};
       raster::Image image{w.width, w.height, {}};
       for_each(level, w, [&](int x0, int y0, int x1, int y1) {
         std::array<int, 4> sum{};
