@@ -357,7 +357,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !stale.any;
+  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !stale.any && !(transitions && steps.is_behind());
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());

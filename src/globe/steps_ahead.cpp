@@ -41,7 +41,9 @@ struct StepsAhead::Work {
 StepsAhead::StepsAhead() : work_(std::make_shared<Work>()) {}
 
 StepsAhead::Surface StepsAhead::at(Globe& globe, const std::optional<UtcTime>& time, const Surface& shown) {
-  if (Surface held = globe.held_surface_at(time)) return held;
+  Surface held = globe.held_surface_at(time);
+  behind_ = held == nullptr;
+  if (held) return held;
   if (!work_->opening.exchange(true)) {
     const bool submitted = globe.try_submit_at(time, [work = work_](SurfaceWorker&, const Surface& surface) {
       {

@@ -23,6 +23,8 @@ class StepsAhead {
 
   /// The surface to show at `time` in place of `shown`: that stays until a worker has opened what another step needs.
   Surface at(Globe& globe, const std::optional<UtcTime>& time, const Surface& shown);
+  /// Whether the last answer of `at` was not that of its time.
+  bool is_behind() const { return behind_; }
 
   /// Call once a frame. While the world's time runs and nothing else is wanted (`idle`): has what `drawn` will show in two
   /// seconds fetched.
@@ -35,6 +37,7 @@ class StepsAhead {
   std::optional<UtcTime::duration> rate(const std::optional<UtcTime>& time, TimePoint now);
 
   std::shared_ptr<Work> work_;
+  bool behind_ = false;
   std::optional<UtcTime> last_time_;
   TimePoint last_frame_;
   Surface next_;

@@ -1,6 +1,8 @@
 #include "globe/view_look.h"
 
 #include <cmath>
+#include <cstddef>
+#include <optional>
 
 #include "geo/sun.h"
 
@@ -9,8 +11,8 @@ namespace {
 
 constexpr std::size_t kMostTiles = 20000;  ///< of a picture
 
-}  // namespace
-
+/// Direction to the light for a camera: the sun at `time`, or without a time the map-maker's light: from the north-west,
+/// 45 degrees high, at the place under the eye.
 geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& camera, const std::optional<UtcTime>& time) {
   if (time) {
     if (const auto sun = geo::direction_to_sun(world.planet, *time)) return *sun;
@@ -19,6 +21,8 @@ geo::Vector<geo::Ecef> light_direction(const World& world, const view::Camera& c
   const auto enu = geo::enu_at(world.ellipsoid, below);
   return enu(geo::Vector<geo::Enu>{{-0.5, 0.5, std::sqrt(0.5)}});
 }
+
+}  // namespace
 
 render::FrameLook look_of(const ViewSettings& settings, const World& world, const view::Camera& camera) {
   render::FrameLook look;
