@@ -85,6 +85,7 @@ std::size_t take_body(char* data, std::size_t, std::size_t count, void* user) {
   Transfer& transfer = *static_cast<Transfer*>(user);
   long status = 0;
   curl_easy_getinfo(transfer.easy.get(), CURLINFO_RESPONSE_CODE, &status);
+  if (status >= 400) return count;  // of an error's text only the status counts
   const bool whole = transfer.request.range && status == 200;  // fine if it is no more than the part that was asked for
   const bool too_much = transfer.reply.body.size() + count > transfer.most_bytes;
   if (whole && (too_much || transfer.request.range->offset > 0)) {

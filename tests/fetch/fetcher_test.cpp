@@ -183,12 +183,14 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
 TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
   const std::string file = "0123456789abcdef";
   std::string headers;
+  bool was_busy = false;
   const LittleServer server([&](const Ask& ask) {
     headers = ask.headers;
     if (ask.path == "/whole") return Say{.body = file};
     if (ask.path == "/other") return Say{.status = 206, .body = "2345", .headers = {"Content-Range: bytes 2-5/16"}};
     if (ask.path == "/short") return Say{.status = 206, .body = "345", .headers = {"Content-Range: bytes 3-5/16"}};
     if (ask.path == "/silent") return Say{.status = 206, .body = "3456"};
+    if (ask.path == "/busy" && !std::exchange(was_busy, true)) return Say{.status = 503, .body = std::string(400, '!')};
     if (ask.path == "/odd") return Say{.status = 206, .body = "3456", .headers = {"Content-Range: bytes 3-6/*"}};
     return test::part_of(file, ask, "\"v1\"");
   });
@@ -205,6 +207,7 @@ TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
   CHECK(middle->etag == "\"v1\"");
   CHECK(headers.find("Range: bytes=3-6\r\n") != std::string::npos);
   CHECK_MESSAGE(headers.find("Accept-Encoding") == std::string::npos, "the bytes of the file, not of a compressed one");
+  CHECK_MESSAGE(part("/busy", {3, 4}).value().body == "3456", "an error's text may be longer than the part");
   CHECK(part("/file", {12, 100}).value().body == "cdef");
   CHECK(part("/whole", {0, 16}).value().body == file);
   CHECK(part("/whole", {0, 16}).value().whole_bytes == 16);
