@@ -1,6 +1,7 @@
 #include "fetch/disk_cache.h"
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <system_error>
 #include <utility>
@@ -93,11 +94,11 @@ std::int64_t checksum_of(std::string_view key, std::string_view body) {
 struct DiskCache::State {
   std::filesystem::path file;
   std::size_t budget_bytes = 0;
+  std::atomic<std::int64_t> bytes{0};  ///< written with the mutex held
 
   mutable std::mutex mutex;  ///< guards what follows
   Database database;
   Statement find, put, drop, use, renew, sum, oldest;
-  std::int64_t bytes = 0;
   bool full = false;         ///< the disk, told once
 
   bool execute(const char* text) { return sqlite3_exec(database.get(), text, nullptr, nullptr, nullptr) == SQLITE_OK; }
@@ -287,9 +288,6 @@ std::int64_t DiskCache::verify() {
   return static_cast<std::int64_t>(wrong.size());
 }
 
-std::size_t DiskCache::bytes() const {
-  std::lock_guard lock(state_->mutex);
-  return static_cast<std::size_t>(state_->bytes);
-}
+std::size_t DiskCache::bytes() const { return static_cast<std::size_t>(std::max<std::int64_t>(state_->bytes, 0)); }
 
 }  // namespace tellurion::fetch

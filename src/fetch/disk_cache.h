@@ -50,7 +50,7 @@ class DiskCache {
   void clear();
   /// Reads everything; drops entries whose checksum is wrong and tells how many.
   std::int64_t verify();
-  std::size_t bytes() const;    ///< of bodies, as far as this process knows
+  std::size_t bytes() const;    ///< of bodies, as far as this process knows; waits for nothing
 
  private:
   struct State;
