@@ -142,7 +142,7 @@ bool DiskCache::State::open() {
   drop = Statement(database.get(), "DELETE FROM files WHERE key = ?");
   use = Statement(database.get(), "UPDATE files SET used = ? WHERE key = ?");
   renew = Statement(database.get(), "UPDATE files SET expires = ? WHERE key = ?");
-  sum = Statement(database.get(), "SELECT COUNT(*), COALESCE(SUM(bytes), 0), COALESCE(SUM(missing), 0) FROM files");
+  sum = Statement(database.get(), "SELECT COALESCE(SUM(bytes), 0) FROM files");  // of the index alone: other columns lie among the bodies
   oldest = Statement(database.get(), "SELECT key, bytes FROM files ORDER BY used LIMIT 256");
   if (!find || !put || !drop || !use || !renew || !sum || !oldest) return false;
   recount();
@@ -150,7 +150,7 @@ bool DiskCache::State::open() {
 }
 
 void DiskCache::State::recount() {
-  if (sum.run() == SQLITE_ROW) bytes = sum.number(1);
+  if (sum.run() == SQLITE_ROW) bytes = sum.number(0);
   sum.finish();
 }
 
@@ -258,8 +258,8 @@ DiskCache::Contents DiskCache::contents() const {
   State& s = *state_;
   std::lock_guard lock(s.mutex);
   Contents contents;
-  if (s.sum.run() == SQLITE_ROW) contents = {s.sum.number(0), s.sum.number(1), s.sum.number(2)};
-  s.sum.finish();
+  Statement all(s.database.get(), "SELECT COUNT(*), COALESCE(SUM(bytes), 0), COALESCE(SUM(missing), 0) FROM files");
+  if (all && all.run() == SQLITE_ROW) contents = {all.number(0), all.number(1), all.number(2)};
   return contents;
 }
 

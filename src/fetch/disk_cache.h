@@ -46,6 +46,7 @@ class DiskCache {
     std::int64_t bytes = 0;     ///< of bodies
     std::int64_t missing = 0;
   };
+  /// Reads the whole database.
   Contents contents() const;
   void clear();
   /// Reads everything; drops entries whose checksum is wrong and tells how many.
