@@ -105,6 +105,7 @@ struct DiskCache::State {
   bool open();
   std::int64_t version();
   void make_room();
+  void shrink();
   void recount();
 };
 
@@ -127,7 +128,8 @@ bool DiskCache::State::open() {
       " whole INTEGER NOT NULL DEFAULT 0);"
       "CREATE INDEX IF NOT EXISTS files_used ON files (used, bytes);"
       "PRAGMA user_version = {};", kVersion);
-  if (!execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA auto_vacuum = INCREMENTAL;")) return false;
+  // A new file takes auto_vacuum only before anything is written, an old one with its next VACUUM.
+  if (!execute("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")) return false;
   std::int64_t found = version();
   if (found == 1) {
     const bool altered = execute("BEGIN IMMEDIATE; ALTER TABLE files ADD COLUMN whole INTEGER NOT NULL DEFAULT 0; PRAGMA user_version = 2; COMMIT");
@@ -173,7 +175,16 @@ void DiskCache::State::make_room() {
     }
   }
   execute("COMMIT");
-  execute("PRAGMA incremental_vacuum");
+  shrink();
+}
+
+/// Gives pages back to the system, except those that will soon be filled again.
+void DiskCache::State::shrink() {
+  Statement unused(database.get(), "SELECT freelist_count, page_size FROM pragma_freelist_count, pragma_page_size");
+  if (!unused || unused.run() != SQLITE_ROW) return;
+  const std::int64_t room = static_cast<std::int64_t>((1.0 - kRoomAfterwards) * static_cast<double>(budget_bytes)), pages = unused.number(0) - room / unused.number(1);
+  unused.finish();
+  if (pages > 0) execute(fmt::format("PRAGMA incremental_vacuum({})", pages).c_str());
 }
 
 DiskCache::DiskCache(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -266,7 +277,9 @@ DiskCache::Contents DiskCache::contents() const {
 void DiskCache::clear() {
   State& s = *state_;
   std::lock_guard lock(s.mutex);
-  s.execute("DELETE FROM files; PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE)");
+  s.execute("DELETE FROM files");
+  s.execute("VACUUM");
+  s.execute("PRAGMA wal_checkpoint(TRUNCATE)");
   s.recount();
 }
 

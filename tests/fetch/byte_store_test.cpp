@@ -5,6 +5,7 @@
 #include <string>
 
 #include <doctest/doctest.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include "fetch/disk_cache.h"
@@ -161,8 +162,6 @@ TEST_CASE("DiskCache: keeps to its budget, oldest first, and gives out no damage
   CHECK(cache->find("49")->body == std::string(5000, static_cast<char>('a' + 49 % 26)));
   CHECK_FALSE(cache->find("00"));
   CHECK(cache->verify() == 0);
-  cache->clear();
-  CHECK(cache->contents().entries == 0);
 
   cache.reset();
   std::ofstream(folder.file(), std::ios::trunc) << "this is no database at all, and long enough to be read as one";
@@ -170,4 +169,34 @@ TEST_CASE("DiskCache: keeps to its budget, oldest first, and gives out no damage
   CHECK(fs::exists(folder.file().string() + ".damaged"));
   cache->put("new", {"begun", false, {}, {}, later});
   CHECK(cache->find("new")->body == "begun");
+}
+
+TEST_CASE("DiskCache: a cleared one takes no room, nor one that was made without auto_vacuum, and a smaller budget shrinks it") {
+  const Folder folder;
+  fs::create_directories(folder.file().parent_path());
+  const auto later = std::chrono::system_clock::now() + 1h;
+  for (const bool old : {false, true}) {
+    CAPTURE(old);
+    if (old) {
+      sqlite3* database = nullptr;
+      REQUIRE(sqlite3_open(folder.file().c_str(), &database) == SQLITE_OK);
+      REQUIRE(sqlite3_exec(database, "PRAGMA journal_mode = DELETE; PRAGMA auto_vacuum = NONE; VACUUM", nullptr, nullptr, nullptr) == SQLITE_OK);
+      sqlite3_close(database);
+    }
+    auto cache = std::move(DiskCache::open(folder.file(), 10'000'000)).value();
+    for (int i = 0; i < 100; ++i) cache->put(fmt::format("{}", i), {std::string(20'000, 'x'), false, {}, {}, later});
+    CHECK(cache->bytes() > 2'000'000);
+    cache->clear();
+    CHECK(cache->contents().entries == 0);
+    CHECK(cache->bytes() == 0);
+    cache.reset();
+    CHECK(fs::file_size(folder.file()) < 100'000);
+  }
+  auto cache = std::move(DiskCache::open(folder.file(), 10'000'000)).value();
+  for (int i = 0; i < 100; ++i) cache->put(fmt::format("{}", i), {std::string(20'000, 'x'), false, {}, {}, later});
+  cache = std::move(DiskCache::open(folder.file(), 500'000)).value();
+  cache->put("more", {"than fits", false, {}, {}, later});
+  CHECK(cache->bytes() <= 500'000);
+  cache.reset();
+  CHECK(fs::file_size(folder.file()) < 800'000);
 }
