@@ -182,7 +182,7 @@ ByteStore::ByteStore(const StoreOptions& options) : state_(std::make_shared<Stat
   if (!options.disk_file.empty()) {
     auto disk = DiskCache::open(options.disk_file, options.disk_bytes);
     if (disk) state_->disk = std::move(*disk);
-    else log::warning(disk.error().message);
+    else log::warning(disk.error().message + "; what is fetched is not kept");
   }
   if (!options.offline) state_->fetcher = std::make_unique<Fetcher>(options.fetch);
 }

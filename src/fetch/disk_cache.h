@@ -26,8 +26,8 @@ struct DiskEntry {
 
 class DiskCache {
  public:
-  /// Opens or makes the database. A database that cannot be read as such is set aside as FILE.damaged and made anew.
-  /// Errors: unavailable, naming the file.
+  /// Opens or makes the database. A file that is no database, or a damaged one, is set aside as FILE.damaged and made anew.
+  /// Errors: unavailable, naming the file and why: another program holds it, there is no room, a later version made it, ...
   static Result<std::unique_ptr<DiskCache>> open(const std::filesystem::path& file, std::size_t budget_bytes);
   ~DiskCache();
   DiskCache(const DiskCache&) = delete;
@@ -48,7 +48,7 @@ class DiskCache {
   };
   /// Reads the whole database.
   Contents contents() const;
-  void clear();
+  void clear();  ///< FILE.damaged goes as well
   /// Reads everything; drops entries whose checksum is wrong and tells how many.
   std::int64_t verify();
   std::size_t bytes() const;    ///< of bodies, as far as this process knows; waits for nothing

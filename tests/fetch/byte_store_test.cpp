@@ -169,6 +169,33 @@ TEST_CASE("DiskCache: keeps to its budget, oldest first, and gives out no damage
   CHECK(fs::exists(folder.file().string() + ".damaged"));
   cache->put("new", {"begun", false, {}, {}, later});
   CHECK(cache->find("new")->body == "begun");
+  cache->clear();
+  CHECK_FALSE(fs::exists(folder.file().string() + ".damaged"));
+}
+
+TEST_CASE("DiskCache: what cannot be opened for now, or is a later version's, is left as it is") {
+  const Folder folder;
+  const auto later = std::chrono::system_clock::now() + 1h;
+  std::move(DiskCache::open(folder.file(), 100'000)).value()->put("kept", {"body", false, {}, {}, later});
+  const auto refused = [&](const char* command, const char* why) {
+    sqlite3* database = nullptr;
+    REQUIRE(sqlite3_open(folder.file().c_str(), &database) == SQLITE_OK);
+    REQUIRE(sqlite3_exec(database, command, nullptr, nullptr, nullptr) == SQLITE_OK);
+    const auto cache = DiskCache::open(folder.file(), 100'000);
+    REQUIRE_FALSE(cache);
+    CHECK(cache.error().message.find(why) != std::string::npos);
+    CHECK(cache.error().message.find(folder.file().string()) != std::string::npos);
+    CHECK_FALSE(fs::exists(folder.file().string() + ".damaged"));
+    sqlite3_close(database);
+  };
+  refused("PRAGMA user_version = 99", "a later version");
+  refused("PRAGMA user_version = 2; PRAGMA journal_mode = DELETE; BEGIN EXCLUSIVE", "another program");
+  CHECK(std::move(DiskCache::open(folder.file(), 100'000)).value()->find("kept")->body == "body");
+  const fs::path inside = folder.file().parent_path();  // a folder is no file
+  const auto cache = DiskCache::open(inside, 100'000);
+  REQUIRE_FALSE(cache);
+  CHECK(cache.error().message.find("cannot be opened") != std::string::npos);
+  CHECK(fs::is_directory(inside));
 }
 
 TEST_CASE("DiskCache: a cleared one takes no room, nor one that was made without auto_vacuum, and a smaller budget shrinks it") {
