@@ -1,6 +1,7 @@
 #include "fetch/fetcher.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <charconv>
 #include <condition_variable>
@@ -48,6 +49,8 @@ struct Transfer {
   Reply reply;
   std::optional<std::chrono::seconds> retry_after;
   std::size_t most_bytes = 0;
+  std::atomic<std::int64_t>* all_received = nullptr;  ///< of all transfers
+  std::int64_t received = 0;       ///< bytes of the body, as they came, that are counted there
   bool too_large = false;
   bool not_in_parts = false;       ///< the server sends the whole file instead of the range
   std::string content_range;
@@ -81,11 +84,19 @@ std::optional<std::chrono::seconds> retry_after_of(const std::string& value) {
   return std::chrono::seconds(std::max<std::time_t>(date - std::time(nullptr), 0));
 }
 
+/// Counts what has come of the body since it was last called. Compressed bytes count as such.
+void count_received(Transfer& transfer) {
+  curl_off_t received = 0;
+  curl_easy_getinfo(transfer.easy.get(), CURLINFO_SIZE_DOWNLOAD_T, &received);
+  if (received > transfer.received) *transfer.all_received += received - std::exchange(transfer.received, received);
+}
+
 std::size_t take_body(char* data, std::size_t, std::size_t count, void* user) {
   Transfer& transfer = *static_cast<Transfer*>(user);
   long status = 0;
   curl_easy_getinfo(transfer.easy.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status >= 400) return count;  // of an error's text only the status counts
+  count_received(transfer);
   const bool whole = transfer.request.range && status == 200;  // fine if it is no more than the part that was asked for
   const bool too_much = transfer.reply.body.size() + count > transfer.most_bytes;
   if (whole && (too_much || transfer.request.range->offset > 0)) {
@@ -105,6 +116,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   const std::string_view line(data, count);
   if (line.starts_with("HTTP/")) {  // of a redirect's target: what was said before does not count
     transfer.reply = {};
+    transfer.received = 0;
     transfer.retry_after.reset();
     transfer.content_range.clear();
   }
@@ -216,6 +228,7 @@ struct Fetcher::State {
 
   const FetchOptions options;
   CURLM* multi = nullptr;
+  std::atomic<std::int64_t> bytes{0};  ///< FetchStats::bytes
 
   mutable std::mutex mutex;  ///< guards what follows
   std::unordered_map<Ticket, std::unique_ptr<Transfer>> waiting;
@@ -263,6 +276,8 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   Transfer& t = *transfer;
   t.easy.reset(curl_easy_init());
   t.reply = {};
+  t.all_received = &bytes;
+  t.received = 0;
   t.retry_after.reset();
   t.content_range.clear();
   t.too_large = t.not_in_parts = false;
@@ -319,8 +334,7 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   curl_multi_remove_handle(multi, easy);
   long status = 0;
   curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &status);
-  curl_off_t received = 0;
-  curl_easy_getinfo(easy, CURLINFO_SIZE_DOWNLOAD_T, &received);
+  if (status < 400) count_received(*transfer);
   transfer->easy.reset();
   bool again = is_passing(code, status) && !transfer->too_large && !transfer->not_in_parts && transfer->attempts < options.most_attempts;
   auto pause = std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -332,7 +346,6 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   {
     std::lock_guard lock(mutex);
     --stats.in_flight;
-    stats.bytes += received;
     if (again && !closing) {
       transfer->not_before = Clock::now() + pause;
       const Ticket ticket = transfer->ticket;
@@ -477,6 +490,7 @@ void Fetcher::cancel(Ticket ticket) {
 FetchStats Fetcher::stats() const {
   std::lock_guard lock(state_->mutex);
   FetchStats stats = state_->stats;
+  stats.bytes = state_->bytes;
   stats.waiting = static_cast<int>(state_->waiting.size());
   return stats;
 }

@@ -28,7 +28,7 @@ struct FetchStats {
   std::int64_t finished = 0;   ///< transfers answered
   std::int64_t cancelled = 0;
   std::int64_t failed = 0;
-  std::int64_t bytes = 0;      ///< of bodies, as they came over the network
+  std::int64_t bytes = 0;      ///< of bodies, but of errors', as they come over the network: of transfers under way as well
   int waiting = 0;
   int in_flight = 0;
 };

@@ -180,6 +180,23 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
   CHECK(fetcher.stats().cancelled == 2);
 }
 
+TEST_CASE("Fetcher: bytes are counted as they come, those of errors are not") {
+  const LittleServer server([](const Ask& ask) {
+    if (ask.path == "/error") return Say{.status = 404, .body = std::string(500, '!')};
+    return Say{.body = std::string(3000, 'x'), .claims = ask.path == "/slow" ? 4000 : -1, .lingers = ask.path == "/slow" ? 5000ms : 0ms};
+  });
+  Outcomes outcomes;
+  Fetcher fetcher(hasty());
+  fetcher.start({server.url("/error"), {}, "/error", {}}, make_gain(0), outcomes.taker("/error"));
+  fetcher.start({server.url("/whole"), {}, "/whole", {}}, make_gain(0), outcomes.taker("/whole"));
+  outcomes.wait(2);
+  CHECK(fetcher.stats().bytes == 3000);
+  fetcher.start({server.url("/slow"), {}, "/slow", {}}, make_gain(0), outcomes.taker("/slow"));
+  for (int i = 0; i < 500 && fetcher.stats().bytes == 3000; ++i) std::this_thread::sleep_for(1ms);
+  CHECK(fetcher.stats().bytes == 6000);
+  CHECK(fetcher.stats().in_flight == 1);
+}
+
 TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
   const std::string file = "0123456789abcdef";
   std::string headers;
