@@ -35,11 +35,18 @@ struct HeaderDeleter {
 };
 using HeaderList = std::unique_ptr<curl_slist, HeaderDeleter>;
 
+/// Scheme, name and port of a server. Fields are the network thread's own.
+struct Host {
+  int flying = 0;            ///< transfers in flight
+  bool multiplexes = false;  ///< many over one connection
+};
+
 struct Transfer {
   Fetcher::Ticket ticket = 0;
   Request request;
   Gain gain;
   Done done;
+  Host* host = nullptr;
   int attempts = 0;
   Clock::time_point not_before{};  ///< of the next attempt
 
@@ -60,6 +67,13 @@ std::string lower(std::string_view text) {
   std::string out(text);
   std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return out;
+}
+
+/// Of a URL: scheme, name and port.
+std::string host_of(const std::string& url) {
+  const std::string shown = lower(public_part(url));
+  const std::size_t scheme = shown.find("://");
+  return shown.substr(0, scheme == std::string::npos ? scheme : shown.find('/', scheme + 3));
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -115,6 +129,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   Transfer& transfer = *static_cast<Transfer*>(user);
   const std::string_view line(data, count);
   if (line.starts_with("HTTP/")) {  // of a redirect's target: what was said before does not count
+    transfer.host->multiplexes = !line.starts_with("HTTP/1");
     transfer.reply = {};
     transfer.received = 0;
     transfer.retry_after.reset();
@@ -232,6 +247,7 @@ struct Fetcher::State {
 
   mutable std::mutex mutex;  ///< guards what follows
   std::unordered_map<Ticket, std::unique_ptr<Transfer>> waiting;
+  std::unordered_map<std::string, Host> hosts;  ///< all that were ever asked: those of the world's sources
   std::vector<Ticket> to_cancel;
   FetchStats stats;
   Ticket next_ticket = 1;
@@ -243,6 +259,7 @@ struct Fetcher::State {
   std::jthread thread;
 
   void run() noexcept;
+  bool has_room(const Host& host) const { return host.multiplexes || host.flying < options.most_per_host; }
   std::unique_ptr<Transfer> next_due(Clock::time_point now, Clock::time_point& wake);
   void begin(std::unique_ptr<Transfer> transfer);
   void end(CURL* easy, CURLcode code);
@@ -250,7 +267,8 @@ struct Fetcher::State {
   void finish(std::unique_ptr<Transfer> transfer, Outcome outcome);
 };
 
-/// The waiting transfer of the greatest gain that may begin; `wake`: when the next may.
+/// The waiting transfer of the greatest gain that may begin; `wake`: when the next may. One that curl would let wait for a
+/// connection stays here, where its gain counts.
 std::unique_ptr<Transfer> Fetcher::State::next_due(Clock::time_point now, Clock::time_point& wake) {
   std::lock_guard lock(mutex);
   auto best = waiting.end();
@@ -259,6 +277,8 @@ std::unique_ptr<Transfer> Fetcher::State::next_due(Clock::time_point now, Clock:
     const Transfer& transfer = *it->second;
     if (transfer.not_before > now) {
       wake = std::min(wake, transfer.not_before);
+    } else if (!has_room(*transfer.host)) {
+      continue;
     } else if (const double gain = *transfer.gain; best == waiting.end() || gain > greatest || (gain == greatest && transfer.ticket < best->second->ticket)) {
       best = it;
       greatest = gain;
@@ -311,6 +331,7 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   if (!t.request.etag.empty()) t.headers.reset(curl_slist_append(nullptr, ("If-None-Match: " + t.request.etag).c_str()));
   for (const std::string& header : t.request.headers) t.headers.reset(curl_slist_append(t.headers.release(), header.c_str()));
   if (t.headers) curl_easy_setopt(easy, CURLOPT_HTTPHEADER, t.headers.get());
+  ++t.host->flying;
   flying.emplace(easy, std::move(transfer));
   curl_multi_add_handle(multi, easy);
 }
@@ -331,6 +352,7 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   const auto found = flying.find(easy);
   auto transfer = std::move(found->second);
   flying.erase(found);
+  --transfer->host->flying;
   curl_multi_remove_handle(multi, easy);
   long status = 0;
   curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &status);
@@ -376,6 +398,7 @@ void Fetcher::State::cancel_flying() {
     if (found != flying.end()) {
       transfer = std::move(found->second);
       flying.erase(found);
+      --transfer->host->flying;
       curl_multi_remove_handle(multi, transfer->easy.get());
       transfer->easy.reset();
       std::lock_guard lock(mutex);
@@ -470,6 +493,7 @@ Fetcher::Ticket Fetcher::start(Request request, Gain gain, Done done) {
     std::lock_guard lock(state_->mutex);
     ticket = transfer->ticket = state_->next_ticket++;
     if (!state_->closing) {
+      transfer->host = &state_->hosts[host_of(transfer->request.url)];
       state_->waiting.emplace(ticket, std::move(transfer));
       curl_multi_wakeup(state_->multi);
       return ticket;

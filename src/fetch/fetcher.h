@@ -14,7 +14,7 @@ namespace tellurion::fetch {
 
 struct FetchOptions {
   int most_transfers = 32;           ///< at a time, in all
-  int most_per_host = 12;            ///< of them to one host (over HTTP/2 they share a connection)
+  int most_per_host = 12;            ///< of them to one host; over HTTP/2, where they share a connection, as many as in all
   int most_attempts = 4;             ///< of one transfer
   std::chrono::milliseconds first_pause{250};     ///< before the second attempt; doubled for each further one, and jittered
   std::chrono::milliseconds connect_timeout{10'000};
@@ -44,8 +44,8 @@ class Fetcher {
   Fetcher(const Fetcher&) = delete;
   Fetcher& operator=(const Fetcher&) = delete;
 
-  /// Begins as soon as the limits allow, the greatest `gain` first. `done` is called once, on the network thread; it must be
-  /// quick and may start further transfers.
+  /// Begins as soon as the limits allow, of those that may begin the greatest `gain` first. `done` is called once, on the network
+  /// thread; it must be quick and may start further transfers.
   Ticket start(Request request, Gain gain, Done done);
   /// Ends the transfer, in flight or not, as cancelled. Nothing if it is over.
   void cancel(Ticket ticket);

@@ -180,6 +180,27 @@ TEST_CASE("Fetcher: the greatest gain first, within the limit of transfers; canc
   CHECK(fetcher.stats().cancelled == 2);
 }
 
+TEST_CASE("Fetcher: gains count until a host has a connection free; another host's transfers do not wait for it") {
+  const LittleServer slow([](const Ask& ask) { return Say{.body = ask.path, .after = 300ms}; });
+  const LittleServer quick([](const Ask& ask) { return Say{.body = ask.path}; });
+  FetchOptions options = hasty();
+  options.most_per_host = 2;
+  Outcomes outcomes;
+  std::vector<Gain> gains;
+  Fetcher fetcher(options);
+  for (int i = 0; i < 6; ++i) {
+    const std::string path = fmt::format("/{}", i);
+    fetcher.start({slow.url(path), {}, path, {}}, gains.emplace_back(make_gain(10.0 - i)), outcomes.taker(path));
+  }
+  while (slow.most_at_once() < 2) std::this_thread::sleep_for(1ms);
+  gains[5]->store(100.0);
+  fetcher.start({quick.url("/quick"), {}, "/quick", {}}, make_gain(-1.0), outcomes.taker("/quick"));
+  const auto ended = outcomes.wait(7);
+  const auto place = [&](const char* name) { return std::ranges::find(ended, name, [](const auto& one) { return one.first; }) - ended.begin(); };
+  CHECK(place("/quick") == 0);
+  CHECK(place("/5") <= 4);
+}
+
 TEST_CASE("Fetcher: bytes are counted as they come, those of errors are not") {
   const LittleServer server([](const Ask& ask) {
     if (ask.path == "/error") return Say{.status = 404, .body = std::string(500, '!')};
