@@ -18,6 +18,7 @@ namespace {
 using Steady = std::chrono::steady_clock;
 using System = std::chrono::system_clock;
 
+constexpr std::chrono::hours kLongestRetryAfter{1};  ///< that is believed of a server
 constexpr std::size_t kEntryBytes = 256;  ///< of an entry beside its file
 
 struct Entry {
@@ -58,7 +59,7 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
 
   std::optional<Asked> find(const std::string& key);
   void keep(std::string key, std::variant<File, Error> content, Steady::duration lifetime);
-  void keep_failure(const std::string& key, Error error);
+  void keep_failure(const std::string& key, Error error, Steady::duration least_pause = {});
   void forget(const std::string& key);
   Asked begin(const Request& request, double gain);
   std::variant<File, Error> take(const Request& request, Outcome outcome);
@@ -84,12 +85,13 @@ void ByteStore::State::keep(std::string key, std::variant<File, Error> content, 
   while (entries.size() > 1 && bytes > options.memory_bytes) forget(std::string(entries.back().key));
 }
 
-/// Asked for again after a pause, a longer one each time.
-void ByteStore::State::keep_failure(const std::string& key, Error error) {
+/// Asked for again after a pause, a longer one each time, and not before the server allows it.
+void ByteStore::State::keep_failure(const std::string& key, Error error, Steady::duration least_pause) {
   constexpr int kMostDoublings = 10;
   const auto last = index.find(key);
   const int failures = last != index.end() ? std::min(last->second->failures, kMostDoublings) : 0;
-  keep(key, std::move(error), std::min(options.pause_after_failure * (1 << failures), options.longest_pause));
+  const Steady::duration pause = std::min(options.pause_after_failure * (1 << failures), options.longest_pause);
+  keep(key, std::move(error), std::max(pause, least_pause));
   index.find(key)->second->failures = failures + 1;
 }
 
@@ -156,6 +158,7 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
 
 void ByteStore::State::arrived(const Request& request, std::uint64_t number, Outcome outcome) {
   const bool cancelled = !outcome && outcome.error().code == ErrorCode::cancelled;
+  const Steady::duration least_pause = std::min<std::chrono::seconds>(outcome.retry_after.value_or(std::chrono::seconds(0)), kLongestRetryAfter);
   std::shared_ptr<Arrival> arrival;  // its deleter takes the mutex: it has to outlive the lock
   std::variant<File, Error> content = Error{};
   if (!cancelled) content = take(request, std::move(outcome));
@@ -168,7 +171,7 @@ void ByteStore::State::arrived(const Request& request, std::uint64_t number, Out
     }
     if (!cancelled) {
       if (auto* error = std::get_if<Error>(&content)) {
-        keep_failure(request.key, std::move(*error));
+        keep_failure(request.key, std::move(*error), least_pause);
       } else {
         const bool missing = !std::get<File>(content).bytes;
         keep(request.key, std::move(content), missing ? Steady::duration(options.negative_lifetime) : Steady::duration(options.default_lifetime));

@@ -382,6 +382,7 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
     finish(std::move(transfer), std::move(outcome));
   } else {
     Outcome outcome = failure_of(*transfer, code, status, options);
+    outcome.retry_after = transfer->retry_after;
     finish(std::move(transfer), std::move(outcome));
   }
 }

@@ -19,7 +19,7 @@ struct FetchOptions {
   std::chrono::milliseconds first_pause{250};     ///< before the second attempt; doubled for each further one, and jittered
   std::chrono::milliseconds connect_timeout{10'000};
   std::chrono::milliseconds stall_timeout{15'000};  ///< without a byte
-  std::chrono::seconds longest_pause{60};         ///< of what a server asks for by Retry-After; longer ones fail
+  std::chrono::seconds longest_pause{60};         ///< of what a server asks for by Retry-After; with a longer one the transfer fails at once
   std::size_t most_bytes = std::size_t{64} << 20; ///< of a body; larger ones fail
 };
 

@@ -46,7 +46,10 @@ struct Reply {
 /// Errors: not_found (204, 404, 410: there is no such file), unsupported (401, 403 and other refusals: asking again cannot
 /// help; a server that does not give parts), unavailable (no connection, time-out, 429, 5xx: after all retries), exhausted (too large), cancelled.
 /// Messages name the URL without its query, and what to do.
-using Outcome = Result<Reply>;
+struct Outcome : Result<Reply> {
+  using Result<Reply>::Result;
+  std::optional<std::chrono::seconds> retry_after{};  ///< of a failure: for how long the server asks not to be asked again
+};
 using Done = std::function<void(Outcome)>;
 
 /// `url` as messages show it: without user, password and query, which may be credentials.

@@ -102,6 +102,23 @@ TEST_CASE("ByteStore: what does not exist is believed for a while, what failed i
   CHECK(std::get<File>(other.ask(request_of(server, "/none"))).bytes == nullptr);
 }
 
+TEST_CASE("ByteStore: a server that asks for a long pause is not asked again before") {
+  const LittleServer server([](const Ask& ask) { return Say{.status = 503, .headers = {ask.path == "/hour" ? "Retry-After: 7200" : "Retry-After: 1"}}; });
+  const Folder folder;
+  StoreOptions options = options_for(folder.file());
+  options.fetch.longest_pause = 0s;
+  ByteStore store(options);
+  for (const char* path : {"/hour", "/second"}) {
+    CHECK(std::get<Error>(answer(store, request_of(server, path))).code == ErrorCode::unavailable);
+    CHECK(server.asked(path) == 1);
+  }
+  std::this_thread::sleep_for(200ms);
+  for (const char* path : {"/hour", "/second"}) CHECK(std::holds_alternative<Error>(store.ask(request_of(server, path))));
+  std::this_thread::sleep_for(1s);
+  CHECK(std::holds_alternative<Error>(store.ask(request_of(server, "/hour"))));
+  CHECK(std::holds_alternative<std::shared_ptr<Arrival>>(store.ask(request_of(server, "/second"))));
+}
+
 TEST_CASE("ByteStore: an expired file is asked for by its tag, and kept if it has not changed") {
   std::string version = "1";
   const LittleServer server([&](const Ask& ask) {
