@@ -130,7 +130,9 @@ Asked ByteStore::State::begin(const Request& request, double gain) {
   const auto ticket = fetcher->start(request, order, [weak = weak_from_this(), request, number](Outcome outcome) {
     if (const auto state = weak.lock()) state->arrived(request, number, std::move(outcome));
   });
-  flights[request.key] = {arrival, ticket, number};
+  Flight& flight = flights[request.key];
+  if (flight.number > 0) fetcher->cancel(flight.ticket);  // let go of by its last holder, who is about to say so
+  flight = {arrival, ticket, number};
   return arrival;
 }
 
