@@ -19,6 +19,7 @@ using Steady = std::chrono::steady_clock;
 using System = std::chrono::system_clock;
 
 constexpr std::chrono::hours kLongestRetryAfter{1};  ///< that is believed of a server
+constexpr const char* kModified = "modified ";  ///< begins a version that is a date; no tag does
 constexpr std::size_t kEntryBytes = 256;  ///< of an entry beside its file
 
 struct Entry {
@@ -153,6 +154,7 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
   if (request.refuse) {
     if (auto why = request.refuse(outcome->body)) return Error{ErrorCode::unavailable, std::move(*why)};
   }
+  if (outcome->etag.empty() && !outcome->last_modified.empty()) outcome->etag = kModified + outcome->last_modified;
   DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires, outcome->whole_bytes};
   if (disk) disk->put(request.key, entry);
   return file_of(std::move(entry));
@@ -211,7 +213,7 @@ Asked ByteStore::ask(const Request& request, double gain) {
         s.keep(request.key, file, missing ? Steady::duration(s.options.negative_lifetime) : Steady::duration(s.options.default_lifetime));
         return file;
       }
-      if (!entry->missing) wanted.etag = entry->etag;
+      if (!entry->missing && !entry->etag.starts_with(kModified)) wanted.etag = entry->etag;
     }
   }
   if (!s.fetcher) return Error{ErrorCode::unavailable, fmt::format("{}: is not in the disk cache, and --offline fetches nothing", public_part(request.url))};

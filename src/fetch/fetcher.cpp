@@ -140,6 +140,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   const std::string name = lower(line.substr(0, colon));
   const std::string value(trimmed(line.substr(colon + 1)));
   if (name == "etag") transfer.reply.etag = value;
+  if (name == "last-modified") transfer.reply.last_modified = value;
   if (name == "content-type") transfer.reply.content_type = lower(value);
   if (name == "content-range") transfer.content_range = lower(value);
   if (name == "retry-after") transfer.retry_after = retry_after_of(value);

@@ -38,6 +38,7 @@ struct Reply {
   std::string body;
   std::string content_type;
   std::string etag;
+  std::string last_modified{};                  ///< as the server wrote it
   std::optional<std::chrono::seconds> max_age;  ///< for how long the server says that it holds
   bool not_modified = false;                    ///< the bytes are still those of Request::etag; no body
   std::uint64_t whole_bytes = 0;                ///< of the whole file, where a part was asked for
