@@ -118,8 +118,9 @@ int fly(const FlyOptions& options) {
     settings.transitions = options.realtime;
     if (!options.realtime) {
       const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
-      complete &= (*view)->finish(camera, settings, deadline);
-      ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // may wait for data, which the picture has brought
+      const bool finished = (*view)->finish(camera, settings, deadline);
+      complete &= finished;
+      if (finished) ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // by data that the picture has brought
     }
     globe::FrameStats stats = frames.draw(camera, settings);
     stats.frame = frame;
