@@ -145,7 +145,7 @@ int fly(const FlyOptions& options) {
     if (const auto written = write_text(options.trace_file, trace); !written) return report(written.error());
   }
   if (!complete || (*globe)->data_missing()) {
-    fmt::print(stderr, "tellurion: {} is written, but some frames lack data\n", options.out.string());
+    fmt::print(stderr, "tellurion: {}, but some frames lack data\n", options.out.empty() ? "the figures are written" : options.out.string() + " is written");
     return kDataMissing;
   }
   return kDone;
