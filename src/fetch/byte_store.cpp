@@ -1,6 +1,7 @@
 #include "fetch/byte_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -48,6 +49,7 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
 
   const StoreOptions options;
   std::unique_ptr<DiskCache> disk;  ///< null: none
+  std::atomic<std::int64_t> not_kept{0};  ///< FetchStats::not_kept
 
   std::mutex mutex;  ///< guards what follows
   std::list<Entry> entries;  ///< the most recently used first
@@ -63,6 +65,7 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
   void keep_failure(const std::string& key, Error error, Steady::duration least_pause = {});
   void forget(const std::string& key);
   Asked begin(const Request& request, double gain);
+  void put(const std::string& key, const DiskEntry& entry);
   std::variant<File, Error> take(const Request& request, Outcome outcome);
   void arrived(const Request& request, std::uint64_t number, Outcome outcome);
   void abandoned(const std::string& key, std::uint64_t number);
@@ -137,11 +140,15 @@ Asked ByteStore::State::begin(const Request& request, double gain) {
   return arrival;
 }
 
+void ByteStore::State::put(const std::string& key, const DiskEntry& entry) {
+  if (!disk || !disk->put(key, entry)) ++not_kept;
+}
+
 /// What a transfer's outcome says of the file, kept on disk where that makes sense.
 std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome outcome) {
   if (!outcome) {
     if (outcome.error().code != ErrorCode::not_found) return outcome.error();
-    if (disk) disk->put(request.key, {{}, true, {}, {}, System::now() + options.negative_lifetime});
+    put(request.key, {{}, true, {}, {}, System::now() + options.negative_lifetime});
     return File{};
   }
   const System::time_point expires = System::now() + outcome->max_age.value_or(options.default_lifetime);
@@ -156,7 +163,7 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
   }
   if (outcome->etag.empty() && !outcome->last_modified.empty()) outcome->etag = kModified + outcome->last_modified;
   DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires, outcome->whole_bytes};
-  if (disk) disk->put(request.key, entry);
+  put(request.key, entry);
   return file_of(std::move(entry));
 }
 
@@ -229,7 +236,11 @@ void ByteStore::reject(const std::string& key, const std::string& why) {
   s.keep_failure(key, Error{ErrorCode::unavailable, why});
 }
 
-FetchStats ByteStore::stats() const { return state_->fetcher ? state_->fetcher->stats() : FetchStats{}; }
+FetchStats ByteStore::stats() const {
+  FetchStats stats = state_->fetcher ? state_->fetcher->stats() : FetchStats{};
+  stats.not_kept = state_->not_kept;
+  return stats;
+}
 std::size_t ByteStore::disk_bytes() const { return state_->disk ? state_->disk->bytes() : 0; }
 
 }  // namespace tellurion::fetch

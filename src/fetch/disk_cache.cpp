@@ -270,9 +270,9 @@ std::optional<DiskEntry> DiskCache::find(std::string_view key) {
   return entry;
 }
 
-void DiskCache::put(std::string_view key, const DiskEntry& entry) {
+bool DiskCache::put(std::string_view key, const DiskEntry& entry) {
   State& s = *state_;
-  if (entry.body.size() > s.budget_bytes / 4) return;
+  if (entry.body.size() > s.budget_bytes / 4) return false;
   std::lock_guard lock(s.mutex);
   const auto size = static_cast<std::int64_t>(entry.body.size() + key.size());
   const int status = s.put.run(key, Statement::blob(entry.body), std::int64_t{entry.missing}, std::string_view(entry.etag),
@@ -280,10 +280,11 @@ void DiskCache::put(std::string_view key, const DiskEntry& entry) {
   s.put.finish();
   if (status != SQLITE_DONE) {
     if (!std::exchange(s.full, true)) log::warning(fmt::format("{}: {}; what is fetched is not kept", s.file.string(), sqlite3_errstr(status)));
-    return;
+    return false;
   }
   s.bytes += size;
   if (s.bytes > static_cast<std::int64_t>(s.budget_bytes)) s.make_room();
+  return true;
 }
 
 void DiskCache::remove(std::string_view key) {

@@ -35,8 +35,9 @@ class DiskCache {
 
   /// The entry, however old. Counts as a use. One whose checksum is wrong is dropped.
   std::optional<DiskEntry> find(std::string_view key);
-  /// Keeps an entry; the least recently used ones go when the budget is exceeded. If the disk is full nothing is kept.
-  void put(std::string_view key, const DiskEntry& entry);
+  /// Keeps an entry; the least recently used ones go when the budget is exceeded. If the disk is full nothing is kept,
+  /// nor ever what takes more than a quarter of the budget. Whether it is kept.
+  bool put(std::string_view key, const DiskEntry& entry);
   void remove(std::string_view key);
   /// A later time to expire, for what the server says has not changed.
   void renew(std::string_view key, std::chrono::system_clock::time_point expires);

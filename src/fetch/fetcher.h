@@ -29,6 +29,7 @@ struct FetchStats {
   std::int64_t cancelled = 0;
   std::int64_t failed = 0;
   std::int64_t bytes = 0;      ///< of bodies, but of errors', as they come over the network: of transfers under way as well
+  std::int64_t not_kept = 0;   ///< answers of servers that the disk cache could not take, or for which there is none; of a ByteStore
   int waiting = 0;
   int in_flight = 0;
 };

@@ -102,6 +102,24 @@ TEST_CASE("ByteStore: what does not exist is believed for a while, what failed i
   CHECK(std::get<File>(other.ask(request_of(server, "/none"))).bytes == nullptr);
 }
 
+TEST_CASE("ByteStore: what no disk cache takes is counted") {
+  const LittleServer server([](const Ask& ask) { return Say{.body = std::string(ask.path == "/large" ? 3000 : 30, 'x')}; });
+  const Folder folder;
+  StoreOptions options = options_for(folder.file());
+  options.disk_bytes = 10'000;
+  {
+    ByteStore store(options);
+    body(store, request_of(server, "/small"));
+    CHECK(store.stats().not_kept == 0);
+    body(store, request_of(server, "/large"));
+    CHECK(store.stats().not_kept == 1);
+  }
+  options.disk_file = folder.file().parent_path();  // cannot be opened
+  ByteStore store(options);
+  body(store, request_of(server, "/small"));
+  CHECK(store.stats().not_kept == 1);
+}
+
 TEST_CASE("ByteStore: a server that asks for a long pause is not asked again before") {
   const LittleServer server([](const Ask& ask) { return Say{.status = 503, .headers = {ask.path == "/hour" ? "Retry-After: 7200" : "Retry-After: 1"}}; });
   const Folder folder;
