@@ -31,6 +31,7 @@ struct PrefetchOptions : FlightOptions {
   bool has_bounds = false;
   bool has_levels = false;
   bool anyway = false;
+  std::vector<const CLI::Option*> of_flights;  ///< those that say nothing of a region
 };
 
 volatile std::sig_atomic_t g_interrupted = 0;  // a signal handler reaches nothing else
@@ -206,6 +207,11 @@ void check(const PrefetchOptions& options) {
   if (flight && (options.has_bounds || levels || resolution)) throw CLI::ValidationError("--flight", "a flight says itself what it needs: it goes without --bounds, --levels and --resolution");
   if (!flight && (!options.has_bounds || levels == resolution))
     throw CLI::ValidationError("prefetch", "say --bounds W,S,E,N and --levels A-B or --resolution M; or --flight FILE.csv");
+  if (!flight) {
+    for (const CLI::Option* option : options.of_flights) {
+      if (option->count() > 0) throw CLI::ValidationError(option->get_name(), "is an option of flights: it goes with --flight, not with --bounds");
+    }
+  }
   if (options.offline) throw CLI::ValidationError("--offline", "there is nothing to fetch without a network");
 }
 
@@ -217,8 +223,11 @@ void add_prefetch(CLI::App& cache, Run& run) {
   add_world(*command, *options, true);
   add_flight_options(*command, *options);
   add_view_options(*command, *options);
-  add_resource_options(*command, *options);
   command->remove_option(command->get_option("--bounds"));  // of tiles: nothing is drawn here, and the region has that name
+  for (const CLI::Option* option : command->get_options([&](const CLI::Option* one) { return !one->get_lnames().empty() && one != command->get_help_ptr(); })) {
+    if (option->get_name() != "--time") options->of_flights.push_back(option);  // a region of layers with times is fetched at one
+  }
+  add_resource_options(*command, *options);
   command->add_option_function<std::string>("--bounds", [options](const std::string& t) { set_bounds(t, *options); }, "the region, in degrees; west > east: across longitude 180")->type_name("W,S,E,N");
   command->add_option_function<std::string>("--levels", [options](const std::string& t) { set_levels(t, *options); }, "the levels: zooms, the coarsest and the finest")->type_name("A-B");
   command->add_option_function<double>("--resolution", [options](const double& metres) { options->area = {options->area.bounds, {0, 30}, metres, {}}; },

@@ -128,6 +128,10 @@ class Prefetch(Case):
         self.assertIn("--levels", done.stderr)
         done = self.prefetch(world, self.folder / "refused", "--levels", "0-4", status=2)
         self.assertIn("--bounds", done.stderr)
+        for option in (("--size", "640x480"), ("--fps", 10), ("--sse", 2)):
+            done = self.prefetch(world, self.folder / "refused", "--bounds", "0,0,90,60", "--levels", "0-1", *option, status=2)
+            self.assertIn(f"{option[0]}: is an option of flights", done.stderr)
+        self.assertIn("--flight", done.stderr)
         done = self.prefetch(shared(ETOPO5), self.folder / "local", "--bounds", "0,0,90,60", "--levels", "0-4")
         self.assertIn("no layer", done.stdout)
 
