@@ -230,8 +230,8 @@ std::string without_credentials(const std::string& url) {
     const std::string_view part = rest.substr(0, rest.find('&'));
     rest.remove_prefix(std::min(part.size() + 1, rest.size()));
     const std::string name = lower(part.substr(0, part.find('=')));
-    const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
-    if (has("key") || has("token") || has("secret") || has("pass") || has("sig") || has("auth") || has("user")) continue;
+    constexpr const char* kWords[] = {"key", "token", "secret", "pass", "pwd", "sig", "auth", "user", "session", "ticket", "credential"};
+    if (std::ranges::any_of(kWords, [&](const char* word) { return name.find(word) != std::string::npos; })) continue;
     shown += joint;
     shown += part;
     joint = '&';

@@ -263,6 +263,7 @@ TEST_CASE("Fetcher: a part of a file, and what claims to be one") {
 
 TEST_CASE("without_credentials: what names the file stays, what opens the door goes") {
   CHECK(without_credentials("https://a.b/c/1.png?layer=x&apikey=1&Token=2&v=3") == "https://a.b/c/1.png?layer=x&v=3");
+  CHECK(without_credentials("https://a.b/c?pwd=1&layer=x&JSESSIONID=2&ticket=3&X-Amz-Credential=4") == "https://a.b/c?layer=x");
   CHECK(without_credentials("http://u:p@a.b/c") == "http://a.b/c");
   CHECK(public_part("http://u:p@a.b:80/c?d#e") == "http://a.b:80/c");
   CHECK(public_part("http://a.b/c@d") == "http://a.b/c@d");
