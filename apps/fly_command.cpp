@@ -118,8 +118,9 @@ int fly(const FlyOptions& options) {
     settings.transitions = options.realtime;
     if (!options.realtime) {
       const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
-      complete &= (*view)->finish(camera, settings, deadline);
-      ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // may wait for data, which the picture has brought
+      const bool finished = (*view)->finish(camera, settings, deadline);
+      complete &= finished;
+      if (finished) ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // by data that the picture has brought
     }
     globe::FrameStats stats = frames.draw(camera, settings);
     stats.frame = frame;
@@ -144,7 +145,7 @@ int fly(const FlyOptions& options) {
     if (const auto written = write_text(options.trace_file, trace); !written) return report(written.error());
   }
   if (!complete || (*globe)->data_missing()) {
-    fmt::print(stderr, "tellurion: {} is written, but some frames lack data\n", options.out.string());
+    fmt::print(stderr, "tellurion: {}, but some frames lack data\n", options.out.empty() ? "the figures are written" : options.out.string() + " is written");
     return kDataMissing;
   }
   return kDone;

@@ -175,7 +175,7 @@ void GroundWarning::check(const geo::Geodetic& eye, double exaggeration) {
 }
 
 view::Pose camera_or_home(const Options& options, const globe::Globe& globe) {
-  return options.camera.value_or(globe.home());
+  return options.camera ? *options.camera : globe.home();  // home may wait for the network
 }
 
 Result<void> write_text(const std::filesystem::path& file, const std::string& text) {

@@ -24,12 +24,14 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kTypicalTileBytes = 20e3;  ///< of 256 x 256 pixels, where the cache does not know better
 constexpr std::int64_t kKnownTiles = 20;    ///< in the cache, for it to know
+constexpr std::int64_t kMostNotKept = 16;   ///< files that the cache does not take, before no more are fetched
 
 struct PrefetchOptions : FlightOptions {
   globe::PrefetchArea area;
   bool has_bounds = false;
   bool has_levels = false;
   bool anyway = false;
+  std::vector<const CLI::Option*> of_flights;  ///< those that say nothing of a region
 };
 
 volatile std::sig_atomic_t g_interrupted = 0;  // a signal handler reaches nothing else
@@ -75,7 +77,15 @@ class ProgressLine {
   Clock::time_point shown_ = start_;
 };
 
-int ended(bool stopped, std::int64_t done, std::int64_t count, std::int64_t missing, const char* unit, const std::string& last_error) {
+/// Whether there is a point in fetching more: what is not kept is of no use.
+bool may_go_on(const globe::Globe& globe) { return g_interrupted == 0 && globe.fetch_stats().not_kept < kMostNotKept; }
+
+int ended(const std::filesystem::path& folder, std::int64_t not_kept, bool stopped, std::int64_t done, std::int64_t count, std::int64_t missing, const char* unit,
+          const std::string& last_error) {
+  if (not_kept > 0) {
+    return report({ErrorCode::unavailable, fmt::format("{} files came and could not be kept in {}; is it writable, is there room on the disk, and is its bound "
+                                                       "(--disk-cache DIR,MB) large enough?", not_kept, folder.string())});
+  }
   if (stopped) {
     fmt::print(stderr, "tellurion: stopped after {} of {} {}: the same command goes on from there\n", done, count, unit);
     return kFailed;
@@ -123,10 +133,10 @@ int prefetch_region(const PrefetchOptions& options, globe::Globe& globe) {
   ProgressLine line(count, "tiles");
   const auto progress = plan->run([&](const globe::PrefetchProgress& p) {
     line.show(p.done + p.failed, globe.fetch_stats().bytes);
-    return g_interrupted == 0;
+    return may_go_on(globe);
   });
   line.show(progress.done + progress.failed, globe.fetch_stats().bytes, true);
-  return ended(progress.stopped, progress.done, count, count - progress.done, "tiles", progress.last_error);
+  return ended(options.disk_cache, globe.fetch_stats().not_kept, progress.stopped, progress.done, count, count - progress.done, "tiles", progress.last_error);
 }
 
 /// Loads every frame as `fly` would, without drawing it.
@@ -140,7 +150,7 @@ int prefetch_flight(const PrefetchOptions& options, globe::Globe& globe) {
   const int count = frame_count(*flight, options);
   ProgressLine line(count, "frames");
   int frame = 0, incomplete = 0;
-  for (; frame < count && g_interrupted == 0; ++frame) {
+  for (; frame < count && may_go_on(globe); ++frame) {
     const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
     if (!(*view)->finish(frame_camera(*flight, frame, options, globe.ellipsoid()), frame_settings(frame, options), deadline)) ++incomplete;
     line.show(frame + 1, globe.fetch_stats().bytes, frame + 1 == count);
@@ -149,7 +159,7 @@ int prefetch_flight(const PrefetchOptions& options, globe::Globe& globe) {
   for (const auto& source : globe.source_stats()) {
     if (!source.last_error.empty()) last_error = source.last_error;
   }
-  return ended(frame < count, frame, count, incomplete, "frames", last_error);
+  return ended(options.disk_cache, globe.fetch_stats().not_kept, frame < count, frame, count, incomplete, "frames", last_error);
 }
 
 int prefetch(const PrefetchOptions& options) {
@@ -161,10 +171,13 @@ int prefetch(const PrefetchOptions& options) {
   for (const auto& layer : (*globe)->layers()) remote = remote || (layer.raster && layer.raster->description().is_remote);
   if (!remote) {
     const bool missing = (*globe)->data_missing();
-    fmt::print("no layer of this world comes over a network\n");
+    fmt::print("no layer of this world {}comes over a network\n", missing ? "that could be opened " : "");
     return missing ? kDataMissing : kDone;
   }
-  return options.flight.empty() ? prefetch_region(options, **globe) : prefetch_flight(options, **globe);
+  const int status = options.flight.empty() ? prefetch_region(options, **globe) : prefetch_flight(options, **globe);
+  if (status != kDone || !(*globe)->data_missing()) return status;
+  fmt::print(stderr, "tellurion: of other layers, which could not be opened or read, nothing is kept\n");
+  return kDataMissing;
 }
 
 void set_bounds(const std::string& text, PrefetchOptions& options) {
@@ -194,6 +207,11 @@ void check(const PrefetchOptions& options) {
   if (flight && (options.has_bounds || levels || resolution)) throw CLI::ValidationError("--flight", "a flight says itself what it needs: it goes without --bounds, --levels and --resolution");
   if (!flight && (!options.has_bounds || levels == resolution))
     throw CLI::ValidationError("prefetch", "say --bounds W,S,E,N and --levels A-B or --resolution M; or --flight FILE.csv");
+  if (!flight) {
+    for (const CLI::Option* option : options.of_flights) {
+      if (option->count() > 0) throw CLI::ValidationError(option->get_name(), "is an option of flights: it goes with --flight, not with --bounds");
+    }
+  }
   if (options.offline) throw CLI::ValidationError("--offline", "there is nothing to fetch without a network");
 }
 
@@ -205,8 +223,11 @@ void add_prefetch(CLI::App& cache, Run& run) {
   add_world(*command, *options, true);
   add_flight_options(*command, *options);
   add_view_options(*command, *options);
-  add_resource_options(*command, *options);
   command->remove_option(command->get_option("--bounds"));  // of tiles: nothing is drawn here, and the region has that name
+  for (const CLI::Option* option : command->get_options([&](const CLI::Option* one) { return !one->get_lnames().empty() && one != command->get_help_ptr(); })) {
+    if (option->get_name() != "--time") options->of_flights.push_back(option);  // a region of layers with times is fetched at one
+  }
+  add_resource_options(*command, *options);
   command->add_option_function<std::string>("--bounds", [options](const std::string& t) { set_bounds(t, *options); }, "the region, in degrees; west > east: across longitude 180")->type_name("W,S,E,N");
   command->add_option_function<std::string>("--levels", [options](const std::string& t) { set_levels(t, *options); }, "the levels: zooms, the coarsest and the finest")->type_name("A-B");
   command->add_option_function<double>("--resolution", [options](const double& metres) { options->area = {options->area.bounds, {0, 30}, metres, {}}; },

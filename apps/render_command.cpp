@@ -56,7 +56,7 @@ int render(const Options& options) {
   }
   globe::SummaryStats summary;
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-  if (!options.after_ms) GroundWarning(**globe).check(pose.position, options.view.exaggeration);  // by data that the picture has brought
+  if (complete && !options.after_ms) GroundWarning(**globe).check(pose.position, options.view.exaggeration);  // by data that the picture has brought
 
   const raster::Image picture = (*view)->picture(camera, options.view);
   if (const auto written = globe::write_png(options.out, picture); !written) return report(written.error());

@@ -1,6 +1,7 @@
 #include "fetch/byte_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -18,6 +19,8 @@ namespace {
 using Steady = std::chrono::steady_clock;
 using System = std::chrono::system_clock;
 
+constexpr std::chrono::hours kLongestRetryAfter{1};  ///< that is believed of a server
+constexpr const char* kModified = "modified ";  ///< begins a version that is a date; no tag does
 constexpr std::size_t kEntryBytes = 256;  ///< of an entry beside its file
 
 struct Entry {
@@ -46,6 +49,7 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
 
   const StoreOptions options;
   std::unique_ptr<DiskCache> disk;  ///< null: none
+  std::atomic<std::int64_t> not_kept{0};  ///< FetchStats::not_kept
 
   std::mutex mutex;  ///< guards what follows
   std::list<Entry> entries;  ///< the most recently used first
@@ -58,9 +62,10 @@ struct ByteStore::State : std::enable_shared_from_this<State> {
 
   std::optional<Asked> find(const std::string& key);
   void keep(std::string key, std::variant<File, Error> content, Steady::duration lifetime);
-  void keep_failure(const std::string& key, Error error);
+  void keep_failure(const std::string& key, Error error, Steady::duration least_pause = {});
   void forget(const std::string& key);
   Asked begin(const Request& request, double gain);
+  void put(const std::string& key, const DiskEntry& entry);
   std::variant<File, Error> take(const Request& request, Outcome outcome);
   void arrived(const Request& request, std::uint64_t number, Outcome outcome);
   void abandoned(const std::string& key, std::uint64_t number);
@@ -84,12 +89,13 @@ void ByteStore::State::keep(std::string key, std::variant<File, Error> content, 
   while (entries.size() > 1 && bytes > options.memory_bytes) forget(std::string(entries.back().key));
 }
 
-/// Asked for again after a pause, a longer one each time.
-void ByteStore::State::keep_failure(const std::string& key, Error error) {
+/// Asked for again after a pause, a longer one each time, and not before the server allows it.
+void ByteStore::State::keep_failure(const std::string& key, Error error, Steady::duration least_pause) {
   constexpr int kMostDoublings = 10;
   const auto last = index.find(key);
   const int failures = last != index.end() ? std::min(last->second->failures, kMostDoublings) : 0;
-  keep(key, std::move(error), std::min(options.pause_after_failure * (1 << failures), options.longest_pause));
+  const Steady::duration pause = std::min(options.pause_after_failure * (1 << failures), options.longest_pause);
+  keep(key, std::move(error), std::max(pause, least_pause));
   index.find(key)->second->failures = failures + 1;
 }
 
@@ -128,15 +134,21 @@ Asked ByteStore::State::begin(const Request& request, double gain) {
   const auto ticket = fetcher->start(request, order, [weak = weak_from_this(), request, number](Outcome outcome) {
     if (const auto state = weak.lock()) state->arrived(request, number, std::move(outcome));
   });
-  flights[request.key] = {arrival, ticket, number};
+  Flight& flight = flights[request.key];
+  if (flight.number > 0) fetcher->cancel(flight.ticket);  // let go of by its last holder, who is about to say so
+  flight = {arrival, ticket, number};
   return arrival;
+}
+
+void ByteStore::State::put(const std::string& key, const DiskEntry& entry) {
+  if (!disk || !disk->put(key, entry)) ++not_kept;
 }
 
 /// What a transfer's outcome says of the file, kept on disk where that makes sense.
 std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome outcome) {
   if (!outcome) {
     if (outcome.error().code != ErrorCode::not_found) return outcome.error();
-    if (disk) disk->put(request.key, {{}, true, {}, {}, System::now() + options.negative_lifetime});
+    put(request.key, {{}, true, {}, {}, System::now() + options.negative_lifetime});
     return File{};
   }
   const System::time_point expires = System::now() + outcome->max_age.value_or(options.default_lifetime);
@@ -149,13 +161,15 @@ std::variant<File, Error> ByteStore::State::take(const Request& request, Outcome
   if (request.refuse) {
     if (auto why = request.refuse(outcome->body)) return Error{ErrorCode::unavailable, std::move(*why)};
   }
+  if (outcome->etag.empty() && !outcome->last_modified.empty()) outcome->etag = kModified + outcome->last_modified;
   DiskEntry entry{std::move(outcome->body), false, std::move(outcome->etag), std::move(outcome->content_type), expires, outcome->whole_bytes};
-  if (disk) disk->put(request.key, entry);
+  put(request.key, entry);
   return file_of(std::move(entry));
 }
 
 void ByteStore::State::arrived(const Request& request, std::uint64_t number, Outcome outcome) {
   const bool cancelled = !outcome && outcome.error().code == ErrorCode::cancelled;
+  const Steady::duration least_pause = std::min<std::chrono::seconds>(outcome.retry_after.value_or(std::chrono::seconds(0)), kLongestRetryAfter);
   std::shared_ptr<Arrival> arrival;  // its deleter takes the mutex: it has to outlive the lock
   std::variant<File, Error> content = Error{};
   if (!cancelled) content = take(request, std::move(outcome));
@@ -168,7 +182,7 @@ void ByteStore::State::arrived(const Request& request, std::uint64_t number, Out
     }
     if (!cancelled) {
       if (auto* error = std::get_if<Error>(&content)) {
-        keep_failure(request.key, std::move(*error));
+        keep_failure(request.key, std::move(*error), least_pause);
       } else {
         const bool missing = !std::get<File>(content).bytes;
         keep(request.key, std::move(content), missing ? Steady::duration(options.negative_lifetime) : Steady::duration(options.default_lifetime));
@@ -182,7 +196,7 @@ ByteStore::ByteStore(const StoreOptions& options) : state_(std::make_shared<Stat
   if (!options.disk_file.empty()) {
     auto disk = DiskCache::open(options.disk_file, options.disk_bytes);
     if (disk) state_->disk = std::move(*disk);
-    else log::warning(disk.error().message);
+    else log::warning(disk.error().message + "; what is fetched is not kept");
   }
   if (!options.offline) state_->fetcher = std::make_unique<Fetcher>(options.fetch);
 }
@@ -206,7 +220,7 @@ Asked ByteStore::ask(const Request& request, double gain) {
         s.keep(request.key, file, missing ? Steady::duration(s.options.negative_lifetime) : Steady::duration(s.options.default_lifetime));
         return file;
       }
-      if (!entry->missing) wanted.etag = entry->etag;
+      if (!entry->missing && !entry->etag.starts_with(kModified)) wanted.etag = entry->etag;
     }
   }
   if (!s.fetcher) return Error{ErrorCode::unavailable, fmt::format("{}: is not in the disk cache, and --offline fetches nothing", public_part(request.url))};
@@ -222,7 +236,11 @@ void ByteStore::reject(const std::string& key, const std::string& why) {
   s.keep_failure(key, Error{ErrorCode::unavailable, why});
 }
 
-FetchStats ByteStore::stats() const { return state_->fetcher ? state_->fetcher->stats() : FetchStats{}; }
+FetchStats ByteStore::stats() const {
+  FetchStats stats = state_->fetcher ? state_->fetcher->stats() : FetchStats{};
+  stats.not_kept = state_->not_kept;
+  return stats;
+}
 std::size_t ByteStore::disk_bytes() const { return state_->disk ? state_->disk->bytes() : 0; }
 
 }  // namespace tellurion::fetch

@@ -33,7 +33,7 @@ struct StoreOptions {
 struct File {
   std::shared_ptr<const std::string> bytes;  ///< null: the server says that there is no such file
   std::string content_type;
-  std::string etag{};                        ///< the version, if the server names it
+  std::string etag{};                        ///< the version, if the server names it: its tag, else the date of its last change
   std::uint64_t whole_bytes = 0;             ///< of the whole file, where a part was asked for
 };
 

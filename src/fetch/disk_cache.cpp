@@ -1,6 +1,7 @@
 #include "fetch/disk_cache.h"
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <system_error>
 #include <utility>
@@ -88,36 +89,66 @@ std::int64_t checksum_of(std::string_view key, std::string_view body) {
   return static_cast<std::int64_t>(fnv1a(body) ^ (fnv1a(key) * 3));
 }
 
+/// How opening a file ended.
+enum class Opened {
+  yes,
+  foreign,  ///< no database, a damaged one, or one with other tables
+  newer,    ///< made by a later version of the program
+  no,       ///< for now: it is in use, may not be read or written, or the disk is full
+};
+
+std::filesystem::path aside_of(const std::filesystem::path& file) { return file.string() + ".damaged"; }
+
 }  // namespace
 
 struct DiskCache::State {
-  std::filesystem::path file;
-  std::size_t budget_bytes = 0;
+  State(std::filesystem::path f, std::size_t budget) : file(std::move(f)), budget_bytes(budget) {}
+
+  const std::filesystem::path file;
+  const std::size_t budget_bytes;
+  std::atomic<std::int64_t> bytes{0};  ///< written with the mutex held
 
   mutable std::mutex mutex;  ///< guards what follows
   Database database;
   Statement find, put, drop, use, renew, sum, oldest;
-  std::int64_t bytes = 0;
+  int status = SQLITE_OK;    ///< of what failed when it was opened
   bool full = false;         ///< the disk, told once
 
-  bool execute(const char* text) { return sqlite3_exec(database.get(), text, nullptr, nullptr, nullptr) == SQLITE_OK; }
-  bool open();
-  std::int64_t version();
+  int execute(const char* text) { return sqlite3_exec(database.get(), text, nullptr, nullptr, nullptr); }
+  Opened open();
+  Opened failed(int with);
+  std::optional<std::int64_t> version();
+  std::string why_not(Opened opened) const;
   void make_room();
+  void shrink();
   void recount();
 };
 
-/// Of the tables: 0 if there are none yet, -1 if it cannot be read.
-std::int64_t DiskCache::State::version() {
+/// Of the tables: 0 if there are none yet; nothing if it cannot be read.
+std::optional<std::int64_t> DiskCache::State::version() {
   Statement version(database.get(), "PRAGMA user_version");
-  return version && version.run() == SQLITE_ROW ? version.number(0) : -1;
+  if (!version || version.run() != SQLITE_ROW) return std::nullopt;
+  return version.number(0);
 }
 
-bool DiskCache::State::open() {
+Opened DiskCache::State::failed(int with) {
+  status = with;
+  const int kind = with & 0xff;
+  return kind == SQLITE_NOTADB || kind == SQLITE_CORRUPT || kind == SQLITE_ERROR ? Opened::foreign : Opened::no;  // ERROR: no such column
+}
+
+std::string DiskCache::State::why_not(Opened opened) const {
+  const int kind = status & 0xff;
+  if (opened == Opened::newer) return fmt::format("{}: the disk cache was made by a later version of the program; --disk-cache names another folder", file.string());
+  if (kind == SQLITE_BUSY || kind == SQLITE_LOCKED) return fmt::format("{}: the disk cache is held by another program", file.string());
+  return fmt::format("{}: the disk cache cannot be opened: {}; is the folder there and writable, and is there room?", file.string(), sqlite3_errstr(status));
+}
+
+Opened DiskCache::State::open() {
   sqlite3* opened = nullptr;
-  const int status = sqlite3_open_v2(file.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
+  const int status_of_open = sqlite3_open_v2(file.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
   database.reset(opened);
-  if (status != SQLITE_OK) return false;
+  if (status_of_open != SQLITE_OK) return failed(status_of_open);
   sqlite3_busy_timeout(database.get(), kBusyWait_ms);
   sqlite3_extended_result_codes(database.get(), 1);
   const std::string make = fmt::format(
@@ -126,30 +157,40 @@ bool DiskCache::State::open() {
       " whole INTEGER NOT NULL DEFAULT 0);"
       "CREATE INDEX IF NOT EXISTS files_used ON files (used, bytes);"
       "PRAGMA user_version = {};", kVersion);
-  if (!execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA auto_vacuum = INCREMENTAL;")) return false;
-  std::int64_t found = version();
+  // A new file takes auto_vacuum only before anything is written, an old one with its next VACUUM.
+  if (const int set = execute("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"); set != SQLITE_OK) return failed(set);
+  std::optional<std::int64_t> found = version();
   if (found == 1) {
-    const bool altered = execute("BEGIN IMMEDIATE; ALTER TABLE files ADD COLUMN whole INTEGER NOT NULL DEFAULT 0; PRAGMA user_version = 2; COMMIT");
-    if (!altered) execute("ROLLBACK");
+    const int altered = execute("BEGIN IMMEDIATE; ALTER TABLE files ADD COLUMN whole INTEGER NOT NULL DEFAULT 0; PRAGMA user_version = 2; COMMIT");
+    if (altered != SQLITE_OK) execute("ROLLBACK");
     found = version();  // another process may have been faster
+    if (found == 1) return failed(altered);
   }
-  if (found != 0 && found != kVersion) return false;
-  if (found == 0 && !execute(make.c_str())) return false;
-  find = Statement(database.get(), "SELECT body, missing, etag, type, expires, checksum, used, whole FROM files WHERE key = ?");
-  put = Statement(database.get(), "INSERT OR REPLACE INTO files (key, body, missing, etag, type, expires, used, bytes, checksum, whole)"
-                                  " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  drop = Statement(database.get(), "DELETE FROM files WHERE key = ?");
-  use = Statement(database.get(), "UPDATE files SET used = ? WHERE key = ?");
-  renew = Statement(database.get(), "UPDATE files SET expires = ? WHERE key = ?");
-  sum = Statement(database.get(), "SELECT COUNT(*), COALESCE(SUM(bytes), 0), COALESCE(SUM(missing), 0) FROM files");
-  oldest = Statement(database.get(), "SELECT key, bytes FROM files ORDER BY used LIMIT 256");
-  if (!find || !put || !drop || !use || !renew || !sum || !oldest) return false;
+  if (!found) return failed(sqlite3_extended_errcode(database.get()));
+  if (*found > kVersion) return Opened::newer;
+  if (*found < 0) return Opened::foreign;
+  if (*found == 0) {
+    if (const int made = execute(make.c_str()); made != SQLITE_OK) return failed(made);
+  }
+  const std::pair<Statement*, const char*> statements[] = {
+      {&find, "SELECT body, missing, etag, type, expires, checksum, used, whole FROM files WHERE key = ?"},
+      {&put, "INSERT OR REPLACE INTO files (key, body, missing, etag, type, expires, used, bytes, checksum, whole) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"},
+      {&drop, "DELETE FROM files WHERE key = ?"},
+      {&use, "UPDATE files SET used = ? WHERE key = ?"},
+      {&renew, "UPDATE files SET expires = ? WHERE key = ?"},
+      {&sum, "SELECT COALESCE(SUM(bytes), 0) FROM files"},  // of the index alone: other columns lie among the bodies
+      {&oldest, "SELECT key, bytes FROM files ORDER BY used LIMIT 256"},
+  };
+  for (const auto& [statement, text] : statements) {
+    *statement = Statement(database.get(), text);
+    if (!*statement) return failed(sqlite3_extended_errcode(database.get()));
+  }
   recount();
-  return true;
+  return Opened::yes;
 }
 
 void DiskCache::State::recount() {
-  if (sum.run() == SQLITE_ROW) bytes = sum.number(1);
+  if (sum.run() == SQLITE_ROW) bytes = sum.number(0);
   sum.finish();
 }
 
@@ -172,32 +213,36 @@ void DiskCache::State::make_room() {
     }
   }
   execute("COMMIT");
-  execute("PRAGMA incremental_vacuum");
+  shrink();
+}
+
+/// Gives pages back to the system, except those that will soon be filled again.
+void DiskCache::State::shrink() {
+  Statement unused(database.get(), "SELECT freelist_count, page_size FROM pragma_freelist_count, pragma_page_size");
+  if (!unused || unused.run() != SQLITE_ROW) return;
+  const std::int64_t room = static_cast<std::int64_t>((1.0 - kRoomAfterwards) * static_cast<double>(budget_bytes)), pages = unused.number(0) - room / unused.number(1);
+  unused.finish();
+  if (pages > 0) execute(fmt::format("PRAGMA incremental_vacuum({})", pages).c_str());
 }
 
 DiskCache::DiskCache(std::unique_ptr<State> state) : state_(std::move(state)) {}
 DiskCache::~DiskCache() = default;
 
 Result<std::unique_ptr<DiskCache>> DiskCache::open(const std::filesystem::path& file, std::size_t budget_bytes) {
-  auto state = std::make_unique<State>();
-  state->file = file;
-  state->budget_bytes = budget_bytes;
+  auto state = std::make_unique<State>(file, budget_bytes);
   std::error_code failure;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
-  const bool existed = std::filesystem::exists(file, failure);
-  if (!state->open() && existed) {
-    // No database, or one of another version.
-    state = std::make_unique<State>();
-    state->file = file;
-    state->budget_bytes = budget_bytes;
-    std::filesystem::path aside = file;
-    aside += ".damaged";
-    std::filesystem::rename(file, aside, failure);
-    for (const char* more : {"-wal", "-shm"}) std::filesystem::remove(file.string() + more, failure);
-    log::warning(fmt::format("{}: no readable cache; it was set aside as {} and begun anew", file.string(), aside.string()));
-    if (!state->open()) state->database.reset();
+  Opened opened = state->open();
+  if (opened == Opened::foreign) {
+    state = std::make_unique<State>(file, budget_bytes);  // lets go of the file
+    std::filesystem::rename(file, aside_of(file), failure);
+    if (!failure) {
+      for (const char* more : {"-wal", "-shm"}) std::filesystem::remove(file.string() + more, failure);
+      log::warning(fmt::format("{}: no readable cache; it was set aside as {} and begun anew", file.string(), aside_of(file).string()));
+    }
+    opened = state->open();
   }
-  if (!state->oldest) return Error{ErrorCode::unavailable, fmt::format("{}: the disk cache cannot be opened; is the folder there and writable?", file.string())};
+  if (opened != Opened::yes) return Error{ErrorCode::unavailable, state->why_not(opened)};
   return std::unique_ptr<DiskCache>(new DiskCache(std::move(state)));
 }
 
@@ -225,9 +270,9 @@ std::optional<DiskEntry> DiskCache::find(std::string_view key) {
   return entry;
 }
 
-void DiskCache::put(std::string_view key, const DiskEntry& entry) {
+bool DiskCache::put(std::string_view key, const DiskEntry& entry) {
   State& s = *state_;
-  if (entry.body.size() > s.budget_bytes / 4) return;
+  if (entry.body.size() > s.budget_bytes / 4) return false;
   std::lock_guard lock(s.mutex);
   const auto size = static_cast<std::int64_t>(entry.body.size() + key.size());
   const int status = s.put.run(key, Statement::blob(entry.body), std::int64_t{entry.missing}, std::string_view(entry.etag),
@@ -235,10 +280,11 @@ void DiskCache::put(std::string_view key, const DiskEntry& entry) {
   s.put.finish();
   if (status != SQLITE_DONE) {
     if (!std::exchange(s.full, true)) log::warning(fmt::format("{}: {}; what is fetched is not kept", s.file.string(), sqlite3_errstr(status)));
-    return;
+    return false;
   }
   s.bytes += size;
   if (s.bytes > static_cast<std::int64_t>(s.budget_bytes)) s.make_room();
+  return true;
 }
 
 void DiskCache::remove(std::string_view key) {
@@ -257,15 +303,19 @@ DiskCache::Contents DiskCache::contents() const {
   State& s = *state_;
   std::lock_guard lock(s.mutex);
   Contents contents;
-  if (s.sum.run() == SQLITE_ROW) contents = {s.sum.number(0), s.sum.number(1), s.sum.number(2)};
-  s.sum.finish();
+  Statement all(s.database.get(), "SELECT COUNT(*), COALESCE(SUM(bytes), 0), COALESCE(SUM(missing), 0) FROM files");
+  if (all && all.run() == SQLITE_ROW) contents = {all.number(0), all.number(1), all.number(2)};
   return contents;
 }
 
 void DiskCache::clear() {
   State& s = *state_;
   std::lock_guard lock(s.mutex);
-  s.execute("DELETE FROM files; PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE)");
+  s.execute("DELETE FROM files");
+  s.execute("VACUUM");
+  s.execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  std::error_code failure;
+  std::filesystem::remove(aside_of(s.file), failure);
   s.recount();
 }
 
@@ -287,9 +337,6 @@ std::int64_t DiskCache::verify() {
   return static_cast<std::int64_t>(wrong.size());
 }
 
-std::size_t DiskCache::bytes() const {
-  std::lock_guard lock(state_->mutex);
-  return static_cast<std::size_t>(state_->bytes);
-}
+std::size_t DiskCache::bytes() const { return static_cast<std::size_t>(std::max<std::int64_t>(state_->bytes, 0)); }
 
 }  // namespace tellurion::fetch

@@ -26,8 +26,8 @@ struct DiskEntry {
 
 class DiskCache {
  public:
-  /// Opens or makes the database. A database that cannot be read as such is set aside as FILE.damaged and made anew.
-  /// Errors: unavailable, naming the file.
+  /// Opens or makes the database. A file that is no database, or a damaged one, is set aside as FILE.damaged and made anew.
+  /// Errors: unavailable, naming the file and why: another program holds it, there is no room, a later version made it, ...
   static Result<std::unique_ptr<DiskCache>> open(const std::filesystem::path& file, std::size_t budget_bytes);
   ~DiskCache();
   DiskCache(const DiskCache&) = delete;
@@ -35,8 +35,9 @@ class DiskCache {
 
   /// The entry, however old. Counts as a use. One whose checksum is wrong is dropped.
   std::optional<DiskEntry> find(std::string_view key);
-  /// Keeps an entry; the least recently used ones go when the budget is exceeded. If the disk is full nothing is kept.
-  void put(std::string_view key, const DiskEntry& entry);
+  /// Keeps an entry; the least recently used ones go when the budget is exceeded. If the disk is full nothing is kept,
+  /// nor ever what takes more than a quarter of the budget. Whether it is kept.
+  bool put(std::string_view key, const DiskEntry& entry);
   void remove(std::string_view key);
   /// A later time to expire, for what the server says has not changed.
   void renew(std::string_view key, std::chrono::system_clock::time_point expires);
@@ -46,11 +47,12 @@ class DiskCache {
     std::int64_t bytes = 0;     ///< of bodies
     std::int64_t missing = 0;
   };
+  /// Reads the whole database.
   Contents contents() const;
-  void clear();
+  void clear();  ///< FILE.damaged goes as well
   /// Reads everything; drops entries whose checksum is wrong and tells how many.
   std::int64_t verify();
-  std::size_t bytes() const;    ///< of bodies, as far as this process knows
+  std::size_t bytes() const;    ///< of bodies, as far as this process knows; waits for nothing
 
  private:
   struct State;

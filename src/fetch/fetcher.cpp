@@ -1,6 +1,7 @@
 #include "fetch/fetcher.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <charconv>
 #include <condition_variable>
@@ -34,11 +35,18 @@ struct HeaderDeleter {
 };
 using HeaderList = std::unique_ptr<curl_slist, HeaderDeleter>;
 
+/// Scheme, name and port of a server. Fields are the network thread's own.
+struct Host {
+  int flying = 0;            ///< transfers in flight
+  bool multiplexes = false;  ///< many over one connection
+};
+
 struct Transfer {
   Fetcher::Ticket ticket = 0;
   Request request;
   Gain gain;
   Done done;
+  Host* host = nullptr;
   int attempts = 0;
   Clock::time_point not_before{};  ///< of the next attempt
 
@@ -48,6 +56,8 @@ struct Transfer {
   Reply reply;
   std::optional<std::chrono::seconds> retry_after;
   std::size_t most_bytes = 0;
+  std::atomic<std::int64_t>* all_received = nullptr;  ///< of all transfers
+  std::int64_t received = 0;       ///< bytes of the body, as they came, that are counted there
   bool too_large = false;
   bool not_in_parts = false;       ///< the server sends the whole file instead of the range
   std::string content_range;
@@ -57,6 +67,13 @@ std::string lower(std::string_view text) {
   std::string out(text);
   std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return out;
+}
+
+/// Of a URL: scheme, name and port.
+std::string host_of(const std::string& url) {
+  const std::string shown = lower(public_part(url));
+  const std::size_t scheme = shown.find("://");
+  return shown.substr(0, scheme == std::string::npos ? scheme : shown.find('/', scheme + 3));
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -81,10 +98,19 @@ std::optional<std::chrono::seconds> retry_after_of(const std::string& value) {
   return std::chrono::seconds(std::max<std::time_t>(date - std::time(nullptr), 0));
 }
 
+/// Counts what has come of the body since it was last called. Compressed bytes count as such.
+void count_received(Transfer& transfer) {
+  curl_off_t received = 0;
+  curl_easy_getinfo(transfer.easy.get(), CURLINFO_SIZE_DOWNLOAD_T, &received);
+  if (received > transfer.received) *transfer.all_received += received - std::exchange(transfer.received, received);
+}
+
 std::size_t take_body(char* data, std::size_t, std::size_t count, void* user) {
   Transfer& transfer = *static_cast<Transfer*>(user);
   long status = 0;
   curl_easy_getinfo(transfer.easy.get(), CURLINFO_RESPONSE_CODE, &status);
+  if (status >= 400) return count;  // of an error's text only the status counts
+  count_received(transfer);
   const bool whole = transfer.request.range && status == 200;  // fine if it is no more than the part that was asked for
   const bool too_much = transfer.reply.body.size() + count > transfer.most_bytes;
   if (whole && (too_much || transfer.request.range->offset > 0)) {
@@ -103,7 +129,9 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   Transfer& transfer = *static_cast<Transfer*>(user);
   const std::string_view line(data, count);
   if (line.starts_with("HTTP/")) {  // of a redirect's target: what was said before does not count
+    transfer.host->multiplexes = !line.starts_with("HTTP/1");
     transfer.reply = {};
+    transfer.received = 0;
     transfer.retry_after.reset();
     transfer.content_range.clear();
   }
@@ -112,6 +140,7 @@ std::size_t take_header(char* data, std::size_t, std::size_t count, void* user) 
   const std::string name = lower(line.substr(0, colon));
   const std::string value(trimmed(line.substr(colon + 1)));
   if (name == "etag") transfer.reply.etag = value;
+  if (name == "last-modified") transfer.reply.last_modified = value;
   if (name == "content-type") transfer.reply.content_type = lower(value);
   if (name == "content-range") transfer.content_range = lower(value);
   if (name == "retry-after") transfer.retry_after = retry_after_of(value);
@@ -201,8 +230,8 @@ std::string without_credentials(const std::string& url) {
     const std::string_view part = rest.substr(0, rest.find('&'));
     rest.remove_prefix(std::min(part.size() + 1, rest.size()));
     const std::string name = lower(part.substr(0, part.find('=')));
-    const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
-    if (has("key") || has("token") || has("secret") || has("pass") || has("sig") || has("auth") || has("user")) continue;
+    constexpr const char* kWords[] = {"key", "token", "secret", "pass", "pwd", "sig", "auth", "user", "session", "ticket", "credential"};
+    if (std::ranges::any_of(kWords, [&](const char* word) { return name.find(word) != std::string::npos; })) continue;
     shown += joint;
     shown += part;
     joint = '&';
@@ -215,9 +244,11 @@ struct Fetcher::State {
 
   const FetchOptions options;
   CURLM* multi = nullptr;
+  std::atomic<std::int64_t> bytes{0};  ///< FetchStats::bytes
 
   mutable std::mutex mutex;  ///< guards what follows
   std::unordered_map<Ticket, std::unique_ptr<Transfer>> waiting;
+  std::unordered_map<std::string, Host> hosts;  ///< all that were ever asked: those of the world's sources
   std::vector<Ticket> to_cancel;
   FetchStats stats;
   Ticket next_ticket = 1;
@@ -229,6 +260,7 @@ struct Fetcher::State {
   std::jthread thread;
 
   void run() noexcept;
+  bool has_room(const Host& host) const { return host.multiplexes || host.flying < options.most_per_host; }
   std::unique_ptr<Transfer> next_due(Clock::time_point now, Clock::time_point& wake);
   void begin(std::unique_ptr<Transfer> transfer);
   void end(CURL* easy, CURLcode code);
@@ -236,7 +268,8 @@ struct Fetcher::State {
   void finish(std::unique_ptr<Transfer> transfer, Outcome outcome);
 };
 
-/// The waiting transfer of the greatest gain that may begin; `wake`: when the next may.
+/// The waiting transfer of the greatest gain that may begin; `wake`: when the next may. One that curl would let wait for a
+/// connection stays here, where its gain counts.
 std::unique_ptr<Transfer> Fetcher::State::next_due(Clock::time_point now, Clock::time_point& wake) {
   std::lock_guard lock(mutex);
   auto best = waiting.end();
@@ -245,6 +278,8 @@ std::unique_ptr<Transfer> Fetcher::State::next_due(Clock::time_point now, Clock:
     const Transfer& transfer = *it->second;
     if (transfer.not_before > now) {
       wake = std::min(wake, transfer.not_before);
+    } else if (!has_room(*transfer.host)) {
+      continue;
     } else if (const double gain = *transfer.gain; best == waiting.end() || gain > greatest || (gain == greatest && transfer.ticket < best->second->ticket)) {
       best = it;
       greatest = gain;
@@ -262,6 +297,8 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   Transfer& t = *transfer;
   t.easy.reset(curl_easy_init());
   t.reply = {};
+  t.all_received = &bytes;
+  t.received = 0;
   t.retry_after.reset();
   t.content_range.clear();
   t.too_large = t.not_in_parts = false;
@@ -295,6 +332,7 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   if (!t.request.etag.empty()) t.headers.reset(curl_slist_append(nullptr, ("If-None-Match: " + t.request.etag).c_str()));
   for (const std::string& header : t.request.headers) t.headers.reset(curl_slist_append(t.headers.release(), header.c_str()));
   if (t.headers) curl_easy_setopt(easy, CURLOPT_HTTPHEADER, t.headers.get());
+  ++t.host->flying;
   flying.emplace(easy, std::move(transfer));
   curl_multi_add_handle(multi, easy);
 }
@@ -315,11 +353,11 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   const auto found = flying.find(easy);
   auto transfer = std::move(found->second);
   flying.erase(found);
+  --transfer->host->flying;
   curl_multi_remove_handle(multi, easy);
   long status = 0;
   curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &status);
-  curl_off_t received = 0;
-  curl_easy_getinfo(easy, CURLINFO_SIZE_DOWNLOAD_T, &received);
+  if (status < 400) count_received(*transfer);
   transfer->easy.reset();
   bool again = is_passing(code, status) && !transfer->too_large && !transfer->not_in_parts && transfer->attempts < options.most_attempts;
   auto pause = std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -331,7 +369,6 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   {
     std::lock_guard lock(mutex);
     --stats.in_flight;
-    stats.bytes += received;
     if (again && !closing) {
       transfer->not_before = Clock::now() + pause;
       const Ticket ticket = transfer->ticket;
@@ -346,6 +383,7 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
     finish(std::move(transfer), std::move(outcome));
   } else {
     Outcome outcome = failure_of(*transfer, code, status, options);
+    outcome.retry_after = transfer->retry_after;
     finish(std::move(transfer), std::move(outcome));
   }
 }
@@ -362,6 +400,7 @@ void Fetcher::State::cancel_flying() {
     if (found != flying.end()) {
       transfer = std::move(found->second);
       flying.erase(found);
+      --transfer->host->flying;
       curl_multi_remove_handle(multi, transfer->easy.get());
       transfer->easy.reset();
       std::lock_guard lock(mutex);
@@ -456,6 +495,7 @@ Fetcher::Ticket Fetcher::start(Request request, Gain gain, Done done) {
     std::lock_guard lock(state_->mutex);
     ticket = transfer->ticket = state_->next_ticket++;
     if (!state_->closing) {
+      transfer->host = &state_->hosts[host_of(transfer->request.url)];
       state_->waiting.emplace(ticket, std::move(transfer));
       curl_multi_wakeup(state_->multi);
       return ticket;
@@ -476,6 +516,7 @@ void Fetcher::cancel(Ticket ticket) {
 FetchStats Fetcher::stats() const {
   std::lock_guard lock(state_->mutex);
   FetchStats stats = state_->stats;
+  stats.bytes = state_->bytes;
   stats.waiting = static_cast<int>(state_->waiting.size());
   return stats;
 }

@@ -1,35 +1,13 @@
 #include "fetch/remote_file.h"
 
-#include <limits>
 #include <utility>
 #include <variant>
 
 #include <fmt/format.h>
 
+#include "fetch/fetch_now.h"
+
 namespace tellurion::fetch {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr double kFirst = std::numeric_limits<double>::infinity();  ///< the gain of what someone waits for
-
-/// What is asked for, waited for.
-Result<File> wait_until_there(ByteStore& store, const Request& request, std::chrono::milliseconds patience) {
-  const auto deadline = Clock::now() + patience;
-  for (;;) {
-    Asked asked = store.ask(request, kFirst);
-    if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
-    if (auto* file = std::get_if<File>(&asked)) {
-      if (!file->bytes) return Error{ErrorCode::not_found, fmt::format("{}: there is no such file", public_part(request.url))};
-      return std::move(*file);
-    }
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left.count() <= 0 || !std::get<std::shared_ptr<Arrival>>(asked)->wait_for(left))
-      return Error{ErrorCode::unavailable, fmt::format("{}: no answer within {} s; is the server there, and the network?", public_part(request.url), patience.count() / 1000)};
-  }
-}
-
-}  // namespace
 
 Result<std::shared_ptr<const RemoteFile>> RemoteFile::open(std::shared_ptr<ByteStore> store, const std::string& url, std::vector<std::string> headers,
                                                            std::size_t head_bytes, std::chrono::milliseconds patience) {
@@ -40,7 +18,7 @@ Result<std::shared_ptr<const RemoteFile>> RemoteFile::open(std::shared_ptr<ByteS
   made->name_ = without_credentials(url);
   made->head_key_ = fmt::format("{}#0+{}", made->name_, head_bytes);
   const Request request{url, made->headers_, made->head_key_, {}, 0, ByteRange{0, head_bytes}};
-  Result<File> file = wait_until_there(*made->store_, request, patience);
+  Result<File> file = fetch_file_now(*made->store_, request, patience);
   if (!file) return file.error();
   made->head_ = file->bytes;
   made->etag_ = file->etag;
@@ -75,15 +53,9 @@ Asked RemoteFile::ask(const ByteRange& part, double gain) const {
 }
 
 Result<std::shared_ptr<const std::string>> RemoteFile::wait_for(const ByteRange& part, std::chrono::milliseconds patience) const {
-  const auto deadline = Clock::now() + patience;
-  for (;;) {
-    Asked asked = ask(part, kFirst);
-    if (auto* error = std::get_if<Error>(&asked)) return std::move(*error);
-    if (auto* file = std::get_if<File>(&asked)) return std::move(file->bytes);
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left.count() <= 0 || !std::get<std::shared_ptr<Arrival>>(asked)->wait_for(left))
-      return Error{ErrorCode::unavailable, fmt::format("{}: no answer within {} s; is the server there, and the network?", name_, patience.count() / 1000)};
-  }
+  Result<File> file = wait_for_file([&] { return ask(part, kAwaitedGain); }, name_, patience);
+  if (!file) return file.error();
+  return std::move(file->bytes);
 }
 
 void RemoteFile::reject(const ByteRange& part, const std::string& why) const {

@@ -38,6 +38,7 @@ struct Reply {
   std::string body;
   std::string content_type;
   std::string etag;
+  std::string last_modified{};                  ///< as the server wrote it
   std::optional<std::chrono::seconds> max_age;  ///< for how long the server says that it holds
   bool not_modified = false;                    ///< the bytes are still those of Request::etag; no body
   std::uint64_t whole_bytes = 0;                ///< of the whole file, where a part was asked for
@@ -46,7 +47,10 @@ struct Reply {
 /// Errors: not_found (204, 404, 410: there is no such file), unsupported (401, 403 and other refusals: asking again cannot
 /// help; a server that does not give parts), unavailable (no connection, time-out, 429, 5xx: after all retries), exhausted (too large), cancelled.
 /// Messages name the URL without its query, and what to do.
-using Outcome = Result<Reply>;
+struct Outcome : Result<Reply> {
+  using Result<Reply>::Result;
+  std::optional<std::chrono::seconds> retry_after{};  ///< of a failure: for how long the server asks not to be asked again
+};
 using Done = std::function<void(Outcome)>;
 
 /// `url` as messages show it: without user, password and query, which may be credentials.

@@ -122,7 +122,7 @@ Result<World> resolve_world(const std::string& argument) {
   if (argument.empty()) return default_world();
   if (argument.starts_with("http://") || argument.starts_with("https://")) return world_of_tiles(argument);
   if (argument.find("://") != std::string::npos)
-    return Error{ErrorCode::unsupported, fmt::format("{}: tiles come by http:// or https:// only", argument)};
+    return Error{ErrorCode::unsupported, fmt::format("{}: tiles come by http:// or https:// only", fetch::public_part(argument))};
   const std::filesystem::path file(argument);
   if (file.extension() == ".toml") return load_world(file);
   const std::string type = type_by_name(argument);

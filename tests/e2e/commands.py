@@ -171,6 +171,9 @@ class Render(CommandCase):
         for option in ("--stats", "--trace", "--geo"):
             self.refused("render", self.earth, *SMALL, "--out", self.out, option, self.folder / "no/such/file",
                          naming="no/such/file")
+        done = self.tellurion("render", "ftp://me:sesame@host/a?key=sesame", "--out", self.out, status=FAILED)
+        self.assertIn("ftp://host/a: ", done.stderr)
+        self.assertNotIn("sesame", done.stderr)
         text = self.folder / "text.tif"
         text.write_text("no raster\n")
         self.refused("render", text, "--out", self.out, naming=text)
@@ -246,6 +249,14 @@ class Fly(CommandCase):
         self.assertEqual(len(frames), 3)
         for frame in frames:
             self.assertGreaterEqual(frame["frame_ms"], frame["draw_ms"])
+
+    def test_a_flight_measured_without_all_data_says_so(self):
+        world = self.world("missing", ("height", ETOPO5))
+        with world.open("a") as file:
+            file.write('[[layer]]\ngroup = "color"\nsource = { type = "gdal", path = "not-there.tif" }\n')
+        done = self.tellurion("fly", world, self.flight("0,46,8,200000,0,-60,0", "1,46,8,200000,0,-60,0"), "--fps", 1, *SMALL,
+                              "--trace", self.folder / "missing.csv", status=DATA_MISSING)
+        self.assertIn("tellurion: the figures are written, but some frames lack data", done.stderr)
 
     def test_the_clock_rate_turns_the_sun(self):
         flight = self.flight("0,46,8,5000000,0,-90,0", "1,46,8,5000000,0,-90,0")

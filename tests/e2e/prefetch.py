@@ -128,8 +128,29 @@ class Prefetch(Case):
         self.assertIn("--levels", done.stderr)
         done = self.prefetch(world, self.folder / "refused", "--levels", "0-4", status=2)
         self.assertIn("--bounds", done.stderr)
+        for option in (("--size", "640x480"), ("--fps", 10), ("--sse", 2)):
+            done = self.prefetch(world, self.folder / "refused", "--bounds", "0,0,90,60", "--levels", "0-1", *option, status=2)
+            self.assertIn(f"{option[0]}: is an option of flights", done.stderr)
+        self.assertIn("--flight", done.stderr)
         done = self.prefetch(shared(ETOPO5), self.folder / "local", "--bounds", "0,0,90,60", "--levels", "0-4")
         self.assertIn("no layer", done.stdout)
+
+    def test_a_layer_that_cannot_be_opened_is_no_success(self):
+        with TileServer() as server:
+            world = self.world("partly", ("color", f'type = "xyz", url = "{server.url(NIGHT)}/{{z}}/{{x}}/{{-y}}.png", max_level = 4'),
+                               ("color", f'type = "wmts", url = "{server.url("none")}", layer = "none"'))
+            done = self.prefetch(world, self.folder / "partly", "--bounds", "-180,-90,180,90", "--levels", "0-1", status=3)
+            self.assertIn("5 tiles", done.stdout)
+            self.assertEqual(sum(NIGHT in path for path in server.asked), 5)
+            self.assertIn("could not be opened", done.stderr)
+
+    def test_a_cache_that_keeps_nothing_is_a_failure(self):
+        (self.folder / "file").write_text("no folder\n")
+        with TileServer(lambda path, times: time.sleep(0.05)) as server:
+            done = self.prefetch(self.night(server), self.folder / "file", "--bounds", "-180,-90,180,90", "--levels", "0-4", status=1)
+            self.assertIn("could not be kept", done.stderr)
+            self.assertIn(str(self.folder / "file"), done.stderr)
+            self.assertLess(len(server.asked), 341, "no more are fetched in vain")
 
     def test_a_flight_fetched_ahead_is_the_same_without_a_network(self):
         flight = self.folder / "flight.csv"

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <doctest/doctest.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include "fetch/disk_cache.h"
@@ -101,6 +102,41 @@ TEST_CASE("ByteStore: what does not exist is believed for a while, what failed i
   CHECK(std::get<File>(other.ask(request_of(server, "/none"))).bytes == nullptr);
 }
 
+TEST_CASE("ByteStore: what no disk cache takes is counted") {
+  const LittleServer server([](const Ask& ask) { return Say{.body = std::string(ask.path == "/large" ? 3000 : 30, 'x')}; });
+  const Folder folder;
+  StoreOptions options = options_for(folder.file());
+  options.disk_bytes = 10'000;
+  {
+    ByteStore store(options);
+    body(store, request_of(server, "/small"));
+    CHECK(store.stats().not_kept == 0);
+    body(store, request_of(server, "/large"));
+    CHECK(store.stats().not_kept == 1);
+  }
+  options.disk_file = folder.file().parent_path();  // cannot be opened
+  ByteStore store(options);
+  body(store, request_of(server, "/small"));
+  CHECK(store.stats().not_kept == 1);
+}
+
+TEST_CASE("ByteStore: a server that asks for a long pause is not asked again before") {
+  const LittleServer server([](const Ask& ask) { return Say{.status = 503, .headers = {ask.path == "/hour" ? "Retry-After: 7200" : "Retry-After: 1"}}; });
+  const Folder folder;
+  StoreOptions options = options_for(folder.file());
+  options.fetch.longest_pause = 0s;
+  ByteStore store(options);
+  for (const char* path : {"/hour", "/second"}) {
+    CHECK(std::get<Error>(answer(store, request_of(server, path))).code == ErrorCode::unavailable);
+    CHECK(server.asked(path) == 1);
+  }
+  std::this_thread::sleep_for(200ms);
+  for (const char* path : {"/hour", "/second"}) CHECK(std::holds_alternative<Error>(store.ask(request_of(server, path))));
+  std::this_thread::sleep_for(1s);
+  CHECK(std::holds_alternative<Error>(store.ask(request_of(server, "/hour"))));
+  CHECK(std::holds_alternative<std::shared_ptr<Arrival>>(store.ask(request_of(server, "/second"))));
+}
+
 TEST_CASE("ByteStore: an expired file is asked for by its tag, and kept if it has not changed") {
   std::string version = "1";
   const LittleServer server([&](const Ask& ask) {
@@ -161,8 +197,6 @@ TEST_CASE("DiskCache: keeps to its budget, oldest first, and gives out no damage
   CHECK(cache->find("49")->body == std::string(5000, static_cast<char>('a' + 49 % 26)));
   CHECK_FALSE(cache->find("00"));
   CHECK(cache->verify() == 0);
-  cache->clear();
-  CHECK(cache->contents().entries == 0);
 
   cache.reset();
   std::ofstream(folder.file(), std::ios::trunc) << "this is no database at all, and long enough to be read as one";
@@ -170,4 +204,61 @@ TEST_CASE("DiskCache: keeps to its budget, oldest first, and gives out no damage
   CHECK(fs::exists(folder.file().string() + ".damaged"));
   cache->put("new", {"begun", false, {}, {}, later});
   CHECK(cache->find("new")->body == "begun");
+  cache->clear();
+  CHECK_FALSE(fs::exists(folder.file().string() + ".damaged"));
+}
+
+TEST_CASE("DiskCache: what cannot be opened for now, or is a later version's, is left as it is") {
+  const Folder folder;
+  const auto later = std::chrono::system_clock::now() + 1h;
+  std::move(DiskCache::open(folder.file(), 100'000)).value()->put("kept", {"body", false, {}, {}, later});
+  const auto refused = [&](const char* command, const char* why) {
+    sqlite3* database = nullptr;
+    REQUIRE(sqlite3_open(folder.file().c_str(), &database) == SQLITE_OK);
+    REQUIRE(sqlite3_exec(database, command, nullptr, nullptr, nullptr) == SQLITE_OK);
+    const auto cache = DiskCache::open(folder.file(), 100'000);
+    REQUIRE_FALSE(cache);
+    CHECK(cache.error().message.find(why) != std::string::npos);
+    CHECK(cache.error().message.find(folder.file().string()) != std::string::npos);
+    CHECK_FALSE(fs::exists(folder.file().string() + ".damaged"));
+    sqlite3_close(database);
+  };
+  refused("PRAGMA user_version = 99", "a later version");
+  refused("PRAGMA user_version = 2; PRAGMA journal_mode = DELETE; BEGIN EXCLUSIVE", "another program");
+  CHECK(std::move(DiskCache::open(folder.file(), 100'000)).value()->find("kept")->body == "body");
+  const fs::path inside = folder.file().parent_path();  // a folder is no file
+  const auto cache = DiskCache::open(inside, 100'000);
+  REQUIRE_FALSE(cache);
+  CHECK(cache.error().message.find("cannot be opened") != std::string::npos);
+  CHECK(fs::is_directory(inside));
+}
+
+TEST_CASE("DiskCache: a cleared one takes no room, nor one that was made without auto_vacuum, and a smaller budget shrinks it") {
+  const Folder folder;
+  fs::create_directories(folder.file().parent_path());
+  const auto later = std::chrono::system_clock::now() + 1h;
+  for (const bool old : {false, true}) {
+    CAPTURE(old);
+    if (old) {
+      sqlite3* database = nullptr;
+      REQUIRE(sqlite3_open(folder.file().c_str(), &database) == SQLITE_OK);
+      REQUIRE(sqlite3_exec(database, "PRAGMA journal_mode = DELETE; PRAGMA auto_vacuum = NONE; VACUUM", nullptr, nullptr, nullptr) == SQLITE_OK);
+      sqlite3_close(database);
+    }
+    auto cache = std::move(DiskCache::open(folder.file(), 10'000'000)).value();
+    for (int i = 0; i < 100; ++i) cache->put(fmt::format("{}", i), {std::string(20'000, 'x'), false, {}, {}, later});
+    CHECK(cache->bytes() > 2'000'000);
+    cache->clear();
+    CHECK(cache->contents().entries == 0);
+    CHECK(cache->bytes() == 0);
+    cache.reset();
+    CHECK(fs::file_size(folder.file()) < 100'000);
+  }
+  auto cache = std::move(DiskCache::open(folder.file(), 10'000'000)).value();
+  for (int i = 0; i < 100; ++i) cache->put(fmt::format("{}", i), {std::string(20'000, 'x'), false, {}, {}, later});
+  cache = std::move(DiskCache::open(folder.file(), 500'000)).value();
+  cache->put("more", {"than fits", false, {}, {}, later});
+  CHECK(cache->bytes() <= 500'000);
+  cache.reset();
+  CHECK(fs::file_size(folder.file()) < 800'000);
 }

@@ -33,6 +33,7 @@ struct Say {
   int claims = -1;                       ///< Content-Length, if not the body's
   bool hangs_up = false;                 ///< closes without a word
   std::chrono::milliseconds after{0};
+  std::chrono::milliseconds lingers{0};  ///< before it closes
 };
 
 /// Answers as a server that gives parts of `file`, if a part is asked for.
@@ -109,7 +110,7 @@ class LittleServer {
       ++counts_[ask.path];
     }
     const Say say = answer_(ask);
-    for (auto left = say.after; left.count() > 0 && !closing_; left -= std::chrono::milliseconds(10)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    rest(say.after);
     if (!say.hangs_up) {
       std::string reply = fmt::format("HTTP/1.1 {} Some\r\nConnection: close\r\nContent-Length: {}\r\n", say.status,
                                       say.claims >= 0 ? static_cast<std::size_t>(say.claims) : say.body.size());
@@ -121,8 +122,13 @@ class LittleServer {
         sent += static_cast<std::size_t>(count);
       }
     }
+    rest(say.lingers);
     --at_once_;
     close(talk);
+  }
+
+  void rest(std::chrono::milliseconds left) const {
+    for (; left.count() > 0 && !closing_; left -= std::chrono::milliseconds(10)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
 
   std::function<Say(const Ask&)> answer_;
