@@ -127,7 +127,7 @@ struct PmArchive {
   std::string bytes() const {
     std::string out = "PMTiles";
     const auto put = [&](std::uint64_t value, int size) {
-      for (int i = 0; i < size; ++i) out += static_cast<char>(value >> (8 * i) & 0xff);
+      for (int i = 0; i < size; ++i, value >>= 8) out += static_cast<char>(value & 0xff);
     };
     put(static_cast<std::uint64_t>(version), 1);
     std::uint64_t at = 127;
