@@ -4,11 +4,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <future>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "fetch/fetch_now.h"
 #include "source/tiles/bounded_xml.h"
 #include "source/tiles/height_decoders.h"
 #include "source/tiles/service_url.h"
@@ -18,14 +18,6 @@ namespace {
 
 constexpr std::chrono::seconds kLongestWait{30};
 constexpr std::size_t kMostListed = 24;
-
-/// Whether the arrival was over in time.
-bool over_in_time(fetch::Arrival& arrival) {
-  const auto over = std::make_shared<std::promise<void>>();
-  std::future<void> future = over->get_future();
-  arrival.then([over] { over->set_value(); });
-  return future.wait_for(kLongestWait) == std::future_status::ready;
-}
 
 /// How a service says that there is no such tile.
 bool is_out_of_range(const std::string& bytes) {
@@ -87,18 +79,7 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 Result<std::string> fetch_document_bytes(const std::string& url, const std::vector<std::string>& headers, fetch::ByteStore& store) {
-  const std::string name = fetch::without_credentials(url);
-  const fetch::Request request{url, headers, name, {}};
-  fetch::Asked asked = store.ask(request);
-  if (const auto* arrival = std::get_if<std::shared_ptr<fetch::Arrival>>(&asked)) {
-    if (!over_in_time(**arrival)) return Error{ErrorCode::unavailable, fmt::format("{}: no answer within {} s", name, kLongestWait.count())};
-    asked = store.ask(request);
-  }
-  if (const auto* error = std::get_if<Error>(&asked)) return *error;
-  const auto* file = std::get_if<fetch::File>(&asked);
-  if (!file) return Error{ErrorCode::unavailable, fmt::format("{}: the answer does not stay in the cache", name)};
-  if (!file->bytes) return Error{ErrorCode::not_found, fmt::format("{}: there is no such document; is the URL right?", name)};
-  return *file->bytes;
+  return fetch::fetch_now(store, {url, headers, fetch::without_credentials(url), {}}, kLongestWait);
 }
 
 std::shared_ptr<const TileSupply> service_tiles(UrlOfTile url_of, std::vector<std::string> headers, std::string key_prefix,
