@@ -179,6 +179,7 @@ TEST_CASE("service URLs: parameters") {
   CHECK(with_given_parameters("http://h/t?key=own", "http://h/caps?key=k") == "http://h/t?key=own");
   CHECK(with_given_parameters("http://other/t", "http://h/caps?key=k") == "http://other/t");
   CHECK(with_given_parameters("http://h:81/t", "http://h/caps?key=k") == "http://h:81/t");
+  CHECK(with_given_parameters("http://h/t", "https://h/caps?key=k") == "http://h/t");
   CHECK(without_secrets("wrong key sesame!", "http://h/?a=1&key=sesame", "http://h/?a=1") == "wrong key ...!");
 }
 
@@ -188,4 +189,19 @@ TEST_CASE("service URLs: references") {
   CHECK(resolved_url("http://h/a/b.xml", "/0") == "http://h/0");
   CHECK(resolved_url("http://h", "0") == "http://h/0");
   CHECK(resolved_url("http://h/a/b.xml", "https://i/0") == "https://i/0");
+  CHECK(resolved_url("https://h/a/b.xml", "//i/0") == "https://i/0");
+  CHECK(resolved_url("http://h/a/b.xml", "ftp://i/0") == "ftp://i/0");
+  CHECK(resolved_url("http://h/a/b.xml", "0?to=http://i") == "http://h/a/0?to=http://i");
+}
+
+TEST_CASE("service URLs: which are of the same server") {
+  CHECK(same_server("http://h/a", "HTTP://user:word@H:80/b?c"));
+  CHECK(same_server("https://h", "https://h:443/"));
+  CHECK(same_server("http://[::1]:8080/a", "http://[::1]:8080/b"));
+  CHECK_FALSE(same_server("http://h/", "https://h/"));
+  CHECK_FALSE(same_server("http://h/", "http://h:8080/"));
+  CHECK_FALSE(same_server("http://h@other/", "http://h/"));
+  CHECK_FALSE(same_server("http://h.other/", "http://h/"));
+  CHECK_FALSE(same_server("a", "a"));
+  CHECK_FALSE(same_server("", ""));
 }

@@ -8,6 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "fetch/transfer.h"
+#include "source/tiles/service_url.h"
+
 namespace tellurion::source {
 namespace {
 
@@ -112,22 +115,6 @@ bool replace_all(std::string& text, std::string_view from, std::string_view to) 
   return found;
 }
 
-/// `address` as seen from the document at `url`, which is of http: or https:.
-Result<std::string> resolved(const std::string& address, const std::string& url) {
-  if (address.starts_with("http://") || address.starts_with("https://")) return address;
-  const std::size_t query = std::min(url.find_first_of("?#"), url.size());
-  const std::size_t host = url.find("://") + 3;
-  const std::size_t path = std::min(url.find('/', host), query);
-  if (address.starts_with("//")) return url.substr(0, host - 2) + address;
-  if (address.find("://") < address.find_first_of("/?")) return Error{ErrorCode::unsupported, fmt::format("names tiles by \"{}\"; read are http: and https:", address)};
-  std::string absolute = url.substr(0, path);
-  if (!address.starts_with("/")) absolute += path < query ? url.substr(path, url.rfind('/', query - 1) + 1 - path) : "/";
-  absolute += address;
-  const std::string own = query < url.size() && url[query] == '?' ? url.substr(query + 1, url.find('#', query) - query - 1) : "";
-  if (!own.empty()) absolute += (address.find('?') == std::string::npos ? '?' : '&') + own;
-  return absolute;
-}
-
 Result<std::string> read_url(const Json& layer, const CesiumLayer& made, const std::string& url) {
   const auto tiles = layer.find("tiles");
   if (tiles == layer.end() || !tiles->is_array() || tiles->empty() || !tiles->front().is_string()) return corrupt("names no tiles");
@@ -136,7 +123,10 @@ Result<std::string> read_url(const Json& layer, const CesiumLayer& made, const s
   if (made.rows_from_south) replace_all(address, "{y}", "{-y}");
   if (std::any_of(address.begin(), address.end(), [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\x7f'; }))
     return corrupt("names tiles by what is no URL");
-  return resolved(address, url);
+  const std::string absolute = resolved_url(url, address);
+  if (!absolute.starts_with("http://") && !absolute.starts_with("https://"))
+    return Error{ErrorCode::unsupported, fmt::format("names tiles by \"{}\"; read are http: and https:", fetch::public_part(absolute))};
+  return with_given_parameters(absolute, url);
 }
 
 }  // namespace

@@ -282,7 +282,9 @@ Result<std::unique_ptr<RasterSource>> open_wms(const ServiceOptions& options, co
   pyramid.attribution = choice->layers.front().attribution.empty() ? service->title : choice->layers.front().attribution;
   const bool north_first = choice->version_1_3 && choice->axes.north_first;
   const UrlOfTile url_of = [request, grid_of = pyramid.grid, north_first](const TileAddress& tile) { return request + "&BBOX=" + box_text(grid_of, tile, north_first); };
-  pyramid.supply = service_tiles(url_of, options.headers, pyramid.name, std::move(store));
+  const Parameters dimensions(options.dimensions.begin(), options.dimensions.end());
+  pyramid.revision = pyramid.name + mark_of(dimensions);
+  pyramid.supply = service_tiles(url_of, options, dimensions, std::move(store));
   const std::optional<Box> bounds = union_of(choice->layers, [](const WmsLayer& l) { return l.bounds; });
   return open_service(std::move(pyramid), options, bounds, world);
 }

@@ -122,7 +122,7 @@ Result<std::string> filled(const std::string& pattern, const Parameters& fields)
     const std::string name = pattern.substr(open + 1, close == std::string::npos ? close : close - open - 1);
     const auto field = std::find_if(fields.begin(), fields.end(), [&](const auto& f) { return lower(f.first) == lower(name); });
     if (close == std::string::npos || field == fields.end())
-      return Error{ErrorCode::unsupported, fmt::format("its template {} has a field {{{}}} that nothing is known for", fetch::public_part(pattern), name.substr(0, 60))};
+      return Error{ErrorCode::unsupported, fmt::format("its template {} has a field {{{}}} that nothing is known for", fetch::public_part(pattern), name.substr(0, std::min<std::size_t>(name.find_first_of("?&/{"), 60)))};
     url += pattern.substr(at, open - at) + escaped(field->second, true);
     at = close + 1;
   }
@@ -218,7 +218,7 @@ Result<std::unique_ptr<RasterSource>> open_wmts(const ServiceOptions& options, c
     if (!ranges[level].contains(tile)) return std::string();
     return make(matrices[level], tile.column, tile.row).value_or("");
   };
-  pyramid.supply = service_tiles(url_of, options.headers, pyramid.name, std::move(store));
+  pyramid.supply = service_tiles(url_of, options, choice->dimensions, std::move(store));
   return open_service(std::move(pyramid), options, choice->layer->bounds, world);
 }
 
