@@ -1,7 +1,9 @@
 // Where services' tiles lie. Expected values by hand from the standards' formulas; axes as PROJ's projinfo prints them.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <numbers>
+#include <string>
 
 #include "source/proj/crs_axes.h"
 #include "source/service_documents.h"
@@ -159,6 +161,21 @@ TEST_CASE("tms_grid: a region in UTM, rows from the south") {
   CHECK(grid->grid.levels[1].columns == 3);
   CHECK(grid->grid.levels[1].corner == glm::dvec2(500000, 5001280));
   CHECK(!grid->bounds);
+}
+
+TEST_CASE("matrix_grid and tms_grid: numbers beyond all maps make no level") {
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e6, {1e300, 0}, 1, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e-200, {0, 0}, 1, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e6, {0, 0}, 0, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  // A small map with tiles of 1e-20 degrees, of which more than can be counted go round the Earth.
+  const auto map = parse_tms_resource(R"(<TileMap><SRS>EPSG:4326</SRS><BoundingBox minx="-180" miny="-90" maxx="-179.99999999999997" maxy="-89.99999999999998"/><Origin x="-180" y="-90"/>
+    <TileFormat width="256" height="256" extension="png"/><TileSets profile="raster"><TileSet href="0" units-per-pixel="1e-20" order="0"/></TileSets></TileMap>)");
+  REQUIRE(map);
+  CHECK(!tms_grid(*map, axes("EPSG:4326"), "EPSG:4326"));
+  // Levels beyond the last are not looked at.
+  TileMatrixSet deep{"deep", "EPSG:3857", {}};
+  for (int i = 0; i < 40; ++i) deep.matrices.push_back({std::to_string(i), std::ldexp(1e6, -i), {0, 1000}, 256, 256, 1, 1});
+  CHECK(matrix_grid(deep, {}, axes("EPSG:3857"), "EPSG:3857", {})->grid.levels.size() == 31);
 }
 
 TEST_CASE("grid_crs: degrees of the Earth count as those of another body") {

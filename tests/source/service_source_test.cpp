@@ -98,7 +98,7 @@ TEST_CASE("open_wms: headers and keys go to the server of the user's URL only") 
     options.most_level = 2;
     const auto source = open_wms(options, geo::kWgs84, made_store());
     REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
-    look(**source, {500, 250, 8, 8});
+    look(**source, {400, 120, 8, 8});
     REQUIRE_FALSE(asks.empty());
     for (const Ask& ask : asks) {
       CHECK(has(ask.headers, "barley") != elsewhere);
@@ -144,7 +144,7 @@ TEST_CASE("open_wms: tiles are kept by their own URL, without its key, and by al
       options.most_level = 2;
       const auto source = open_wms(options, geo::kWgs84, store);
       REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
-      look(**source, {500, 250, 8, 8});
+      look(**source, {400, 120, 8, 8});
     }
   }
   std::vector<std::string> keys = keys_in(folder / "files.sqlite");
