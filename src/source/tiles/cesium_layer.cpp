@@ -19,7 +19,6 @@ using Json = nlohmann::json;
 constexpr std::size_t kMostBytes = std::size_t{16} << 20;
 constexpr std::size_t kMostLevels = 31;
 constexpr std::size_t kMostRanges = 200'000;  ///< in all; asking for a tile looks through those of its level
-constexpr std::size_t kMostAttribution = 1000;
 
 Error corrupt(std::string what) { return {ErrorCode::corrupt, std::move(what)}; }
 
@@ -62,7 +61,7 @@ Result<void> read_available(const Json& layer, CesiumLayer& made) {
     if (!level.is_array()) return wrong();
     count += level.size();
     if (count > kMostRanges) return Error{ErrorCode::exhausted, fmt::format("lists more than {} ranges of tiles", kMostRanges)};
-    std::vector<TileRange>& ranges = made.available.emplace_back();
+    std::vector<CesiumLayer::Listed>& ranges = made.available.emplace_back();
     for (const Json& range : level) {
       if (!range.is_object()) return wrong();
       const auto x0 = integer_of(range, "startX"), y0 = integer_of(range, "startY"), x1 = integer_of(range, "endX"), y1 = integer_of(range, "endY");
@@ -137,7 +136,7 @@ bool CesiumLayer::may_have(const TileAddress& tile, std::int64_t rows) const {
   if (level >= available.size()) return lists_more;
   const std::int64_t row = rows_from_south ? rows - 1 - tile.row : tile.row;
   const auto& ranges = available[level];
-  return std::any_of(ranges.begin(), ranges.end(), [&](const TileRange& range) {
+  return std::any_of(ranges.begin(), ranges.end(), [&](const Listed& range) {
     return tile.column >= range.first_column && tile.column <= range.last_column && row >= range.first_row && row <= range.last_row;
   });
 }
@@ -155,7 +154,7 @@ Result<CesiumLayer> parse_cesium_layer(std::string_view text, const std::string&
   made.min_zoom = coarsest_level(layer, made);
   made.max_zoom = finest_level(layer, made);
   made.bounds = read_bounds(layer);
-  made.attribution = text_of(layer, "attribution", "").substr(0, kMostAttribution);
+  made.attribution = text_of(layer, "attribution", "");
   return made;
 }
 
