@@ -13,6 +13,7 @@
 #include "fetch/little_server.h"
 #include "source/made_archive.h"
 #include "source/made_raster.h"
+#include "source/tiles/archive_tile.h"
 
 using namespace tellurion;
 using namespace tellurion::source;
@@ -213,6 +214,36 @@ TEST_CASE("open_mbtiles: damaged files are refused or read, never more") {
     const auto image = (*reader)->read_colours(0, {0, 0, std::min(full.width, 128), std::min(full.height, 128)});
     CHECK((image || !image.error().message.empty()));
   }
+}
+
+TEST_CASE("open_mbtiles: a damaged tile is told as corrupt, which is not asked for again") {
+  const Folder folder("mbtiles_tile");
+  const auto file = folder / "a.mbtiles";
+  make_mbtiles(file);
+  Database(file).run("UPDATE tiles SET tile_data = x'89504e470d0a1a0a00' WHERE tile_column = 1 AND tile_row = 1");
+  const Source source = open_mbtiles(archive_at(file), geo::kWgs84);
+  REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
+  auto reader = (*source)->open_reader();
+  REQUIRE(reader);
+  const auto image = (*reader)->read_colours(0, {100, 30, 1, 1});
+  REQUIRE_FALSE(image);
+  CHECK(image.error().code == ErrorCode::corrupt);
+}
+
+TEST_CASE("plain_text: tags and control characters go, and whole characters stay") {
+  CHECK(plain_text("<a href=\"x\">A</a>\tB\x7f") == "AB");
+  CHECK(plain_text("\u0439\u009b\u00e9") == "\u0439\u00e9");
+  for (const char* letter : {"\u0439", "\u6c34", "\U0001f30d"}) {
+    const std::string one = letter;
+    std::string text;
+    while (text.size() <= 600) text += one;
+    const std::string cut = plain_text(text);
+    CHECK(cut.size() == 500 / one.size() * one.size());
+    CHECK(text.starts_with(cut));
+    CHECK(plain_text("a" + text).size() == 1 + 499 / one.size() * one.size());
+  }
+  CHECK(plain_text(std::string(600, 'x')).size() == 500);
+  CHECK(plain_text(std::string(500, 'x')).size() == 500);
 }
 
 TEST_CASE("open_geopackage: heights in UTM as GDAL wrote them, with a scale per tile and without") {

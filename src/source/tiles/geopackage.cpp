@@ -222,6 +222,7 @@ Result<std::unique_ptr<RasterSource>> open_geopackage(const TileArchive& archive
     pyramid.decode_heights = [heights = *table->heights](const std::string& bytes, const TileAddress&) { return gridded_heights(bytes, heights); };
   } else {
     pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
+    pyramid.encoding = archive.encoding;
   }
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_of_contents(*table, pyramid.grid, world);
   pyramid.vertical = archive.vertical;

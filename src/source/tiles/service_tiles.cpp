@@ -141,6 +141,7 @@ Result<std::unique_ptr<RasterSource>> open_service(TilePyramid pyramid, const Se
   if (const Result<void> kept = keep_levels(pyramid.grid, options); !kept) return naming(pyramid.name, kept.error());
   pyramid.kind = options.kind;
   pyramid.decode_heights = height_decoder(options.encoding, pyramid.grid);
+  pyramid.encoding = options.encoding;
   pyramid.sample_type = options.kind == SampleKind::height && options.encoding.empty() ? "Float32" : "Byte";
   pyramid.vertical = options.vertical;
   pyramid.is_remote = true;
