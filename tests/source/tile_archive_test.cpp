@@ -189,6 +189,9 @@ TEST_CASE("open_mbtiles: texts of a UTF-16 database are read") {
   const Source source = open_mbtiles(archive_at(file), geo::kWgs84);
   check_four(source);
   CHECK((*source)->description().attribution == "Those who made it");
+  CHECK(to_degrees((*source)->description().bounds.north).value == doctest::Approx(85.0).epsilon(0.001));
+  Database(file).run("UPDATE metadata SET value = 'pbf' WHERE name = 'format'");
+  CHECK(message_of(open_mbtiles(archive_at(file), geo::kWgs84)).find("(pbf)") != std::string::npos);
 }
 
 TEST_CASE("open_mbtiles: damaged files are refused or read, never more") {
