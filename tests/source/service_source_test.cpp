@@ -158,3 +158,25 @@ TEST_CASE("open_wms: tiles are kept by their own URL, without its key, and by al
     CHECK_FALSE(has(key, "sesame"));
   }
 }
+
+TEST_CASE("open_wms: what two layers with tens of thousands of CRSs have in common is found at once") {
+  std::string first, second;
+  for (int i = 0; i < 30'000; ++i) {
+    first += "<CRS>EPSG:" + std::to_string(1'000'000 + i) + "</CRS>";
+    second += "<CRS>EPSG:" + std::to_string(1'100'000 + i) + "</CRS>";
+  }
+  const std::string box = R"(<EX_GeographicBoundingBox><westBoundLongitude>0</westBoundLongitude><eastBoundLongitude>1</eastBoundLongitude><southBoundLatitude>0</southBoundLatitude>
+    <northBoundLatitude>1</northBoundLatitude></EX_GeographicBoundingBox>)";
+  const std::string capabilities = R"(<WMS_Capabilities version="1.3.0"><Capability><Request><GetMap><Format>image/png</Format></GetMap></Request><Layer><Layer><Name>a</Name>)" + first +
+                                   "<CRS>urn:ogc:def:crs:EPSG::4326</CRS>" + box + "</Layer><Layer><Name>b</Name>" + second + "<CRS>EPSG:4326</CRS>" + box +
+                                   "</Layer></Layer></Capability></WMS_Capabilities>";
+  const LittleServer server([&](const Ask&) { return Say{.body = capabilities}; });
+  ServiceOptions options;
+  options.url = server.url("/caps");
+  options.layer = "a,b";
+  const auto start = std::chrono::steady_clock::now();
+  const auto source = open_wms(options, geo::kWgs84, made_store());
+  REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(20));
+  CHECK((*source)->description().crs_name == "WGS 84");
+}
