@@ -10,7 +10,7 @@
 
 namespace tellurion {
 
-/// Whether `bytes` begin as every gzip file does. Nothing else that we read begins so.
+/// Whether `bytes` begin as every gzip file that is packed by "deflate" does. A heightmap may happen to begin so.
 bool is_gzip(std::string_view bytes);
 
 /// What a gzip file of one or more members holds; checksums are verified. Errors: corrupt (no gzip, cut off, damaged, or

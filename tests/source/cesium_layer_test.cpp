@@ -62,6 +62,7 @@ TEST_CASE("parse_cesium_layer: tiles are found from where the layer lies, with i
   CHECK(url_of(R"("tiles": ["/b/{z}/{x}/{y}"])", "https://user:word@host:8/a/layer.json?key=1") == "https://user:word@host:8/b/{z}/{x}/{-y}?key=1");
   CHECK(url_of(R"("tiles": ["//other/{z}/{x}/{y}"])", "https://host/a/layer.json?key=1") == "https://other/{z}/{x}/{-y}");
   CHECK(url_of(R"("tiles": ["http://other/{z}/{x}/{y}", "http://third/{z}/{x}/{y}"])", "https://host/a?key=1") == "http://other/{z}/{x}/{-y}");
+  CHECK(url_of(R"("tiles": ["http://host/{z}/{x}/{y}"])", "https://host/a?key=1") == "http://host/{z}/{x}/{-y}");
   CHECK(url_of(R"("tiles": ["{z}/{x}/{y}"], "scheme": "slippyMap")") == "http://host:81/terrain/{z}/{x}/{y}");
 }
 

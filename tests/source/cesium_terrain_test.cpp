@@ -101,6 +101,31 @@ TEST_CASE("open_cesium_terrain: tiles lie where the layer says, and those that i
   CHECK(accepts);
 }
 
+TEST_CASE("open_cesium_terrain: headers go to the layer's own server only") {
+  for (const bool elsewhere : {false, true}) {
+    std::atomic<int> with{0}, without{0};
+    const auto count = [&](const Ask& ask) {
+      if (ask.path.find(".terrain") == std::string::npos) return;
+      ++(ask.headers.find("Authorization: Bearer barley") != std::string::npos ? with : without);
+      CHECK(ask.headers.find("Accept: application/vnd.quantized-mesh") != std::string::npos);
+    };
+    const LittleServer other([&](const Ask& ask) { return count(ask), serve(ask, ""); });
+    std::string layer = kLayer;
+    if (elsewhere) layer.replace(layer.find("{z}"), 0, other.url("/terrain/"));
+    const LittleServer server([&](const Ask& ask) { return count(ask), serve(ask, layer); });
+    CesiumTerrain terrain;
+    terrain.url = server.url("/terrain/layer.json");
+    terrain.headers = {"Authorization: Bearer barley"};
+    const auto source = open_cesium_terrain(terrain, geo::kWgs84, made_store());
+    REQUIRE(source);
+    const auto reader = (*source)->open_reader();
+    REQUIRE(reader);
+    CHECK(read(**reader, 0, {2 * 128 + 7, 9, 4, 4}).at(2, 2) == doctest::Approx(200 + 20 + 3));
+    CHECK((with > 0) != elsewhere);
+    CHECK((without > 0) == elsewhere);
+  }
+}
+
 TEST_CASE("open_cesium_terrain: max_zoom leaves finer levels out") {
   const LittleServer server([&](const Ask& ask) { return serve(ask, kLayer); });
   CesiumTerrain terrain{.url = server.url("/terrain/layer.json"), .headers = {}, .tile_size = 64, .max_zoom = 1, .vertical = {}};

@@ -1,6 +1,9 @@
 #include "source/gdal/picture_file.h"
 
 #include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,4 +74,28 @@ TEST_CASE("decode_exact_picture: what is no picture is corrupt, what is too larg
   const auto large = decode_exact_picture(written("PNG"), kSide - 1);
   REQUIRE_FALSE(large);
   CHECK(large.error().code == ErrorCode::exhausted);
+}
+
+TEST_CASE("decode_height_band: 16-bit numbers that name no value for voids have the usual ones") {
+  GDALAllRegister();
+  for (const std::optional<double> no_data : {std::optional<double>(), std::optional(-9999.0)}) {
+    const char* path = "/vsimem/picture_file_test.tif";
+    {
+      const GDALDatasetUniquePtr file(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(path, 5, 1, 1, GDT_Int16, nullptr));
+      if (no_data) file->GetRasterBand(1)->SetNoDataValue(*no_data);
+      std::array<std::int16_t, 5> samples{-32768, -32767, -32766, -9999, 7};
+      REQUIRE(file->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, 5, 1, samples.data(), 5, 1, GDT_Int16, 0, 0, nullptr) == CE_None);
+    }
+    vsi_l_offset size = 0;
+    const GByte* data = VSIGetMemFileBuffer(path, &size, FALSE);
+    const std::string bytes(reinterpret_cast<const char*>(data), size);
+    VSIUnlink(path);
+    const auto grid = decode_height_band(bytes, kSide);
+    REQUIRE(grid);
+    CHECK(std::isnan(grid->at(0, 0)) == !no_data);
+    CHECK(std::isnan(grid->at(1, 0)) == !no_data);
+    CHECK(grid->at(2, 0) == -32766.0f);
+    CHECK(std::isnan(grid->at(3, 0)) == no_data.has_value());
+    CHECK(grid->at(4, 0) == 7.0f);
+  }
 }

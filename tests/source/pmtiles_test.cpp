@@ -83,6 +83,10 @@ TEST_CASE("read_header: what the archive says, and why it is not read") {
   CHECK_FALSE(place_of({0, 0, 1, 0}, *header));
 
   for (std::size_t length = 0; length < bytes.size(); ++length) CHECK_FALSE(read_header(bytes.substr(0, length), length));
+  // Fewer bytes at hand than the archive has.
+  CHECK_FALSE(read_header(bytes.substr(0, kHeaderBytes), bytes.size()));
+  CHECK_FALSE(read_header(bytes.substr(0, kHeaderBytes + made.root.size() - 1), bytes.size()));
+  CHECK(read_header(bytes.substr(0, kHeaderBytes + made.root.size()), bytes.size()));
   const auto refused = [](PmArchive archive, ErrorCode code, const char* word) {
     const std::string b = archive.bytes();
     const auto read = read_header(b, b.size());

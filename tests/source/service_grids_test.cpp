@@ -1,7 +1,9 @@
 // Where services' tiles lie. Expected values by hand from the standards' formulas; axes as PROJ's projinfo prints them.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <numbers>
+#include <string>
 
 #include "source/proj/crs_axes.h"
 #include "source/service_documents.h"
@@ -161,6 +163,21 @@ TEST_CASE("tms_grid: a region in UTM, rows from the south") {
   CHECK(!grid->bounds);
 }
 
+TEST_CASE("matrix_grid and tms_grid: numbers beyond all maps make no level") {
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e6, {1e300, 0}, 1, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e-200, {0, 0}, 1, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  CHECK(!matrix_grid(one_matrix("EPSG:3857", 1e6, {0, 0}, 0, 1), {}, axes("EPSG:3857"), "EPSG:3857", {}));
+  // A small map with tiles of 1e-20 degrees, of which more than can be counted go round the Earth.
+  const auto map = parse_tms_resource(R"(<TileMap><SRS>EPSG:4326</SRS><BoundingBox minx="-180" miny="-90" maxx="-179.99999999999997" maxy="-89.99999999999998"/><Origin x="-180" y="-90"/>
+    <TileFormat width="256" height="256" extension="png"/><TileSets profile="raster"><TileSet href="0" units-per-pixel="1e-20" order="0"/></TileSets></TileMap>)");
+  REQUIRE(map);
+  CHECK(!tms_grid(*map, axes("EPSG:4326"), "EPSG:4326"));
+  // Levels beyond the last are not looked at.
+  TileMatrixSet deep{"deep", "EPSG:3857", {}};
+  for (int i = 0; i < 40; ++i) deep.matrices.push_back({std::to_string(i), std::ldexp(1e6, -i), {0, 1000}, 256, 256, 1, 1});
+  CHECK(matrix_grid(deep, {}, axes("EPSG:3857"), "EPSG:3857", {})->grid.levels.size() == 31);
+}
+
 TEST_CASE("grid_crs: degrees of the Earth count as those of another body") {
   CHECK(grid_crs("EPSG:4326", axes("EPSG:4326"), geo::kWgs84) == "EPSG:4326");
   CHECK(grid_crs("EPSG:4326", axes("EPSG:4326"), geo::kMars).starts_with("+proj=longlat"));
@@ -179,6 +196,7 @@ TEST_CASE("service URLs: parameters") {
   CHECK(with_given_parameters("http://h/t?key=own", "http://h/caps?key=k") == "http://h/t?key=own");
   CHECK(with_given_parameters("http://other/t", "http://h/caps?key=k") == "http://other/t");
   CHECK(with_given_parameters("http://h:81/t", "http://h/caps?key=k") == "http://h:81/t");
+  CHECK(with_given_parameters("http://h/t", "https://h/caps?key=k") == "http://h/t");
   CHECK(without_secrets("wrong key sesame!", "http://h/?a=1&key=sesame", "http://h/?a=1") == "wrong key ...!");
 }
 
@@ -188,4 +206,19 @@ TEST_CASE("service URLs: references") {
   CHECK(resolved_url("http://h/a/b.xml", "/0") == "http://h/0");
   CHECK(resolved_url("http://h", "0") == "http://h/0");
   CHECK(resolved_url("http://h/a/b.xml", "https://i/0") == "https://i/0");
+  CHECK(resolved_url("https://h/a/b.xml", "//i/0") == "https://i/0");
+  CHECK(resolved_url("http://h/a/b.xml", "ftp://i/0") == "ftp://i/0");
+  CHECK(resolved_url("http://h/a/b.xml", "0?to=http://i") == "http://h/a/0?to=http://i");
+}
+
+TEST_CASE("service URLs: which are of the same server") {
+  CHECK(same_server("http://h/a", "HTTP://user:word@H:80/b?c"));
+  CHECK(same_server("https://h", "https://h:443/"));
+  CHECK(same_server("http://[::1]:8080/a", "http://[::1]:8080/b"));
+  CHECK_FALSE(same_server("http://h/", "https://h/"));
+  CHECK_FALSE(same_server("http://h/", "http://h:8080/"));
+  CHECK_FALSE(same_server("http://h@other/", "http://h/"));
+  CHECK_FALSE(same_server("http://h.other/", "http://h/"));
+  CHECK_FALSE(same_server("a", "a"));
+  CHECK_FALSE(same_server("", ""));
 }

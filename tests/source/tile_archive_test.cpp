@@ -13,6 +13,7 @@
 #include "fetch/little_server.h"
 #include "source/made_archive.h"
 #include "source/made_raster.h"
+#include "source/tiles/archive_tile.h"
 
 using namespace tellurion;
 using namespace tellurion::source;
@@ -172,6 +173,25 @@ TEST_CASE("open_mbtiles: what cannot be shown is said") {
   Database(folder / "product.mbtiles").run("CREATE TABLE n (v); INSERT INTO n VALUES (1), (2), (3), (4), (5), (6), (7), (8), (9), (10);"
       "CREATE VIEW tiles AS SELECT a.v AS zoom_level, 0 AS tile_column, 0 AS tile_row, x'00' AS tile_data FROM n a, n b, n c, n d, n e, n f, n g, n h, n i, n j, n k, n l");
   CHECK(message("product.mbtiles").find("too long") != std::string::npos);
+  // A few steps, each of which looks through a long text.
+  Database(folder / "slow.mbtiles").run("CREATE TABLE n (v); INSERT INTO n VALUES (1), (2), (3), (4), (5), (6), (7), (8), (9), (10); CREATE TABLE long (t); INSERT INTO long VALUES (hex(zeroblob(500000)));"
+      "CREATE VIEW tiles AS SELECT a.v AS zoom_level, 0 AS tile_column, 0 AS tile_row, x'00' AS tile_data FROM n a, n b, n c, n d, n e, n f, long WHERE t LIKE '%0' || b.v || c.v || d.v || e.v || f.v || '1'");
+  const auto start = std::chrono::steady_clock::now();
+  CHECK(message("slow.mbtiles").find("too long") != std::string::npos);
+  CHECK(std::chrono::steady_clock::now() - start < 60s);
+}
+
+TEST_CASE("open_mbtiles: texts of a UTF-16 database are read") {
+  const Folder folder("mbtiles_utf16");
+  const auto file = folder / "wide.mbtiles";
+  Database(file).run("PRAGMA encoding = 'UTF-16'; CREATE TABLE first (x)");
+  make_mbtiles(file);
+  const Source source = open_mbtiles(archive_at(file), geo::kWgs84);
+  check_four(source);
+  CHECK((*source)->description().attribution == "Those who made it");
+  CHECK(to_degrees((*source)->description().bounds.north).value == doctest::Approx(85.0).epsilon(0.001));
+  Database(file).run("UPDATE metadata SET value = 'pbf' WHERE name = 'format'");
+  CHECK(message_of(open_mbtiles(archive_at(file), geo::kWgs84)).find("(pbf)") != std::string::npos);
 }
 
 TEST_CASE("open_mbtiles: damaged files are refused or read, never more") {
@@ -197,6 +217,36 @@ TEST_CASE("open_mbtiles: damaged files are refused or read, never more") {
     const auto image = (*reader)->read_colours(0, {0, 0, std::min(full.width, 128), std::min(full.height, 128)});
     CHECK((image || !image.error().message.empty()));
   }
+}
+
+TEST_CASE("open_mbtiles: a damaged tile is told as corrupt, which is not asked for again") {
+  const Folder folder("mbtiles_tile");
+  const auto file = folder / "a.mbtiles";
+  make_mbtiles(file);
+  Database(file).run("UPDATE tiles SET tile_data = x'89504e470d0a1a0a00' WHERE tile_column = 1 AND tile_row = 1");
+  const Source source = open_mbtiles(archive_at(file), geo::kWgs84);
+  REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
+  auto reader = (*source)->open_reader();
+  REQUIRE(reader);
+  const auto image = (*reader)->read_colours(0, {100, 30, 1, 1});
+  REQUIRE_FALSE(image);
+  CHECK(image.error().code == ErrorCode::corrupt);
+}
+
+TEST_CASE("plain_text: tags and control characters go, and whole characters stay") {
+  CHECK(plain_text("<a href=\"x\">A</a>\tB\x7f") == "AB");
+  CHECK(plain_text("\u0439\u009b\u00e9") == "\u0439\u00e9");
+  for (const char* letter : {"\u0439", "\u6c34", "\U0001f30d"}) {
+    const std::string one = letter;
+    std::string text;
+    while (text.size() <= 600) text += one;
+    const std::string cut = plain_text(text);
+    CHECK(cut.size() == 500 / one.size() * one.size());
+    CHECK(text.starts_with(cut));
+    CHECK(plain_text("a" + text).size() == 1 + 499 / one.size() * one.size());
+  }
+  CHECK(plain_text(std::string(600, 'x')).size() == 500);
+  CHECK(plain_text(std::string(500, 'x')).size() == 500);
 }
 
 TEST_CASE("open_geopackage: heights in UTM as GDAL wrote them, with a scale per tile and without") {
@@ -288,6 +338,11 @@ TEST_CASE("open_geopackage: one of several tables, and what cannot be shown is s
   CHECK(message("text.gpkg").find("no SQLite database") != std::string::npos);
   Database(folder / "other.gpkg").run("CREATE TABLE x (y)");
   CHECK(message("other.gpkg").find("no GeoPackage") != std::string::npos);
+  Database(folder / "flood.gpkg").run("CREATE TABLE n (v); INSERT INTO n VALUES (1), (2), (3), (4), (5), (6), (7), (8), (9), (10); CREATE TABLE long (t); INSERT INTO long VALUES (hex(zeroblob(500000)));"
+      "CREATE VIEW gpkg_contents AS SELECT t AS table_name, 'tiles' AS data_type, 0 AS min_x, 0 AS min_y, 1 AS max_x, 1 AS max_y FROM n a, n b, long");
+  const Source flood = open_geopackage(archive_at(folder / "flood.gpkg"), geo::kWgs84);
+  CHECK(message_of(flood).find("32 MB") != std::string::npos);
+  CHECK(flood.error().code == ErrorCode::exhausted);
   if (const auto cities = test::shared_data("earth/archives/cities.gpkg"))
     CHECK(message_of(open_geopackage(archive_at(*cities), geo::kWgs84)).find("no tiles") != std::string::npos);
   Database(file).run("DROP TRIGGER gpkg_tile_matrix_pixel_x_size_update; UPDATE gpkg_tile_matrix SET pixel_x_size = -1 WHERE table_name = 'second'");

@@ -27,6 +27,11 @@ TEST_CASE("TileTemplate: what is missing or unknown is named") {
   CHECK(fault("http://h/{z}/{x}.png").find("{y}") != std::string::npos);
   CHECK(fault("http://h/{z}/{x}/{y}/{time}").find("{time}") != std::string::npos);
   CHECK(fault("http://h/{z}/{x}/{y").find("{y}") != std::string::npos);
+  // What follows an open brace may hold a key.
+  for (const char* open : {"http://h/{z}/{x}/{y?key=sesame", "http://h/{z}/{x}/{y.png?key=sesame&a={z}", "http://h/{z}/{x}/{y/sesame"}) {
+    CHECK(fault(open).find("{y}") != std::string::npos);
+    CHECK(fault(open).find("sesame") == std::string::npos);
+  }
   CHECK(fault("http://{s}/{z}/{x}/{y}").find("subdomains") != std::string::npos);
   CHECK(fault("").find("{z}") != std::string::npos);
 }

@@ -14,6 +14,7 @@
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/jpeg_header.h"
 #include "source/gdal/unpacked_copy.h"
+#include "source/undeclared_voids.h"
 
 namespace tellurion::source {
 namespace {
@@ -167,7 +168,7 @@ HeightPlan plan_heights(GDALRasterBand& band, const GdalOptions& options, const 
   plan.offset = options.offset.value_or(band.GetOffset());
   // Planetary grids may give distances from the body's centre.
   if (std::abs(plan.offset * plan.unit - world.a()) < 0.02 * world.a()) plan.offset -= world.a() / plan.unit;
-  plan.limit_metres = std::max(0.015 * world.a(), 30'000.0);
+  plan.limit_metres = height_limit(world);
   return plan;
 }
 

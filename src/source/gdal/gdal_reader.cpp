@@ -9,6 +9,7 @@
 
 #include "raster/box_average.h"
 #include "source/proj/raise_heights.h"
+#include "source/undeclared_voids.h"
 
 namespace tellurion::source {
 namespace {
@@ -110,7 +111,7 @@ Result<raster::HeightGrid> GdalReader::heights_of_overview(int overview, const P
   raster::HeightGrid grid{window.width, window.height, std::vector<float>(samples.size(), raster::kNoHeight)};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const double sample = samples[i];
-    if (sample == no_data || (plan.int16_voids && sample <= -32767.0) || (!mask.empty() && mask[i] == 0.0)) continue;
+    if (sample == no_data || (plan.int16_voids && is_int16_void(sample)) || (!mask.empty() && mask[i] == 0.0)) continue;
     const double metres = (sample * plan.scale + plan.offset) * plan.unit;
     if (std::abs(metres) <= plan.limit_metres) grid.metres[i] = static_cast<float>(metres);
   }

@@ -86,10 +86,6 @@ PixelRange reach_of(const GdalLayout& layout, PixelMapping& mapping) {
   return range;
 }
 
-}  // namespace
-
-namespace {
-
 /// A source over what `inspect` has found.
 Result<std::unique_ptr<RasterSource>> make_source(GdalLayout inspected) {
   auto layout = std::make_shared<GdalLayout>(std::move(inspected));

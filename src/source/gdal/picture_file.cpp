@@ -11,6 +11,7 @@
 #include <gdal_priv.h>
 
 #include "source/gdal/gdal_runtime.h"
+#include "source/undeclared_voids.h"
 
 namespace tellurion::source {
 namespace {
@@ -182,8 +183,9 @@ Result<raster::HeightGrid> decode_height_band(const std::string& bytes, int larg
     return Error{ErrorCode::corrupt, quiet.last()};
   int has = FALSE;
   const auto no_data = static_cast<float>(band.GetNoDataValue(&has));
+  const bool int16_voids = has == FALSE && band.GetRasterDataType() == GDT_Int16;
   for (float& metres : grid.metres) {
-    if ((has != FALSE && metres == no_data) || !std::isfinite(metres)) metres = raster::kNoHeight;
+    if ((has != FALSE && metres == no_data) || (int16_voids && is_int16_void(static_cast<double>(metres))) || !std::isfinite(metres)) metres = raster::kNoHeight;
   }
   return grid;
 }

@@ -26,7 +26,7 @@ Result<raster::Image> decode_picture(const std::string& bytes, int largest_side)
 /// Likewise a picture whose colours must be exact, as those that code heights. Errors also: unsupported (compressed with loss).
 Result<raster::Image> decode_exact_picture(const std::string& bytes, int largest_side);
 
-/// The first band of such bytes as heights, no-data values as NaN. Errors likewise.
+/// The first band of such bytes as heights, no-data values, declared or of 16 bits undeclared, as NaN. Errors likewise.
 Result<raster::HeightGrid> decode_height_band(const std::string& bytes, int largest_side);
 
 /// Writes bands of width * height doubles as a float64 TIFF; `names` describes them. Errors: unavailable, naming the file.

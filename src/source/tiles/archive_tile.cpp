@@ -20,15 +20,21 @@ Result<int> side_of_tile(const std::string& bytes, const std::string& archive) {
 
 std::string plain_text(const std::string& html) {
   constexpr std::size_t kMost = 500;
+  const auto byte_at = [&](std::size_t i) { return i < html.size() ? static_cast<unsigned char>(html[i]) : 0u; };
   std::string text;
   bool in_tag = false;
-  for (const char c : html) {
-    if (text.size() == kMost) break;
-    if (c == '<') in_tag = true;
-    if (!in_tag && (static_cast<unsigned char>(c) >= ' ' && c != 0x7f)) text += c;
-    if (c == '>') in_tag = false;
+  for (std::size_t i = 0; i < html.size() && text.size() <= kMost; ++i) {
+    const unsigned byte = byte_at(i);
+    const bool second_kind = byte == 0xc2 && byte_at(i + 1) >= 0x80 && byte_at(i + 1) < 0xa0;  // control characters beyond ASCII
+    if (byte == '<') in_tag = true;
+    if (!in_tag && byte >= ' ' && byte != 0x7f && !second_kind) text += html[i];
+    if (byte == '>') in_tag = false;
+    if (second_kind) ++i;
   }
-  while (!text.empty() && text.size() == kMost && (static_cast<unsigned char>(text.back()) & 0x80) != 0) text.pop_back();  // no half a character
+  if (text.size() <= kMost) return text;
+  std::size_t end = kMost;
+  while (end > kMost - 3 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;  // no half a character
+  text.resize(end);
   return text;
 }
 

@@ -10,7 +10,7 @@ namespace tellurion::source {
 /// Pixels on a side of a tile that is a square picture. Errors: unsupported (no picture that is read, not square), naming `archive`.
 Result<int> side_of_tile(const std::string& bytes, const std::string& archive);
 
-/// `html` without its tags and control characters, at most 500 bytes: an attribution for one line.
+/// `html`, in UTF-8, without its tags and control characters, at most 500 bytes of whole characters: an attribution for one line.
 std::string plain_text(const std::string& html);
 
 /// Levels deeper than that have more pixels than can be numbered.

@@ -8,6 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "fetch/transfer.h"
+#include "source/tiles/service_url.h"
+
 namespace tellurion::source {
 namespace {
 
@@ -16,7 +19,6 @@ using Json = nlohmann::json;
 constexpr std::size_t kMostBytes = std::size_t{16} << 20;
 constexpr std::size_t kMostLevels = 31;
 constexpr std::size_t kMostRanges = 200'000;  ///< in all; asking for a tile looks through those of its level
-constexpr std::size_t kMostAttribution = 1000;
 
 Error corrupt(std::string what) { return {ErrorCode::corrupt, std::move(what)}; }
 
@@ -59,7 +61,7 @@ Result<void> read_available(const Json& layer, CesiumLayer& made) {
     if (!level.is_array()) return wrong();
     count += level.size();
     if (count > kMostRanges) return Error{ErrorCode::exhausted, fmt::format("lists more than {} ranges of tiles", kMostRanges)};
-    std::vector<TileRange>& ranges = made.available.emplace_back();
+    std::vector<CesiumLayer::Listed>& ranges = made.available.emplace_back();
     for (const Json& range : level) {
       if (!range.is_object()) return wrong();
       const auto x0 = integer_of(range, "startX"), y0 = integer_of(range, "startY"), x1 = integer_of(range, "endX"), y1 = integer_of(range, "endY");
@@ -112,22 +114,6 @@ bool replace_all(std::string& text, std::string_view from, std::string_view to) 
   return found;
 }
 
-/// `address` as seen from the document at `url`, which is of http: or https:.
-Result<std::string> resolved(const std::string& address, const std::string& url) {
-  if (address.starts_with("http://") || address.starts_with("https://")) return address;
-  const std::size_t query = std::min(url.find_first_of("?#"), url.size());
-  const std::size_t host = url.find("://") + 3;
-  const std::size_t path = std::min(url.find('/', host), query);
-  if (address.starts_with("//")) return url.substr(0, host - 2) + address;
-  if (address.find("://") < address.find_first_of("/?")) return Error{ErrorCode::unsupported, fmt::format("names tiles by \"{}\"; read are http: and https:", address)};
-  std::string absolute = url.substr(0, path);
-  if (!address.starts_with("/")) absolute += path < query ? url.substr(path, url.rfind('/', query - 1) + 1 - path) : "/";
-  absolute += address;
-  const std::string own = query < url.size() && url[query] == '?' ? url.substr(query + 1, url.find('#', query) - query - 1) : "";
-  if (!own.empty()) absolute += (address.find('?') == std::string::npos ? '?' : '&') + own;
-  return absolute;
-}
-
 Result<std::string> read_url(const Json& layer, const CesiumLayer& made, const std::string& url) {
   const auto tiles = layer.find("tiles");
   if (tiles == layer.end() || !tiles->is_array() || tiles->empty() || !tiles->front().is_string()) return corrupt("names no tiles");
@@ -136,7 +122,10 @@ Result<std::string> read_url(const Json& layer, const CesiumLayer& made, const s
   if (made.rows_from_south) replace_all(address, "{y}", "{-y}");
   if (std::any_of(address.begin(), address.end(), [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\x7f'; }))
     return corrupt("names tiles by what is no URL");
-  return resolved(address, url);
+  const std::string absolute = resolved_url(url, address);
+  if (!absolute.starts_with("http://") && !absolute.starts_with("https://"))
+    return Error{ErrorCode::unsupported, fmt::format("names tiles by \"{}\"; read are http: and https:", fetch::public_part(absolute))};
+  return with_given_parameters(absolute, url);
 }
 
 }  // namespace
@@ -147,7 +136,7 @@ bool CesiumLayer::may_have(const TileAddress& tile, std::int64_t rows) const {
   if (level >= available.size()) return lists_more;
   const std::int64_t row = rows_from_south ? rows - 1 - tile.row : tile.row;
   const auto& ranges = available[level];
-  return std::any_of(ranges.begin(), ranges.end(), [&](const TileRange& range) {
+  return std::any_of(ranges.begin(), ranges.end(), [&](const Listed& range) {
     return tile.column >= range.first_column && tile.column <= range.last_column && row >= range.first_row && row <= range.last_row;
   });
 }
@@ -165,7 +154,7 @@ Result<CesiumLayer> parse_cesium_layer(std::string_view text, const std::string&
   made.min_zoom = coarsest_level(layer, made);
   made.max_zoom = finest_level(layer, made);
   made.bounds = read_bounds(layer);
-  made.attribution = text_of(layer, "attribution", "").substr(0, kMostAttribution);
+  made.attribution = text_of(layer, "attribution", "");
   return made;
 }
 

@@ -17,15 +17,14 @@ namespace tellurion::source {
 
 enum class TerrainFormat { quantized_mesh, heightmap };
 
-/// Tiles of one level, ends included; rows as the server counts them.
-struct TileRange {
-  std::int64_t first_column = 0;
-  std::int64_t first_row = 0;
-  std::int64_t last_column = 0;
-  std::int64_t last_row = 0;
-};
-
 struct CesiumLayer {
+  /// Tiles of one level, ends included; rows as the server counts them.
+  struct Listed {
+    std::int64_t first_column = 0;
+    std::int64_t first_row = 0;
+    std::int64_t last_column = 0;
+    std::int64_t last_row = 0;
+  };
   TerrainFormat format = TerrainFormat::quantized_mesh;
   bool mercator = false;            ///< EPSG:3857, one tile at level 0; otherwise EPSG:4326, two side by side
   bool rows_from_south = true;      ///< of the server's rows; false: scheme "slippyMap"
@@ -33,7 +32,7 @@ struct CesiumLayer {
   int min_zoom = 0;                 ///< coarser levels hold no tiles
   std::optional<int> max_zoom;      ///< nothing: the server does not say
   /// By level. A level beyond them may hold tiles if `lists_more`: then they are listed in tiles.
-  std::vector<std::vector<TileRange>> available;
+  std::vector<std::vector<Listed>> available;
   bool lists_more = false;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees, west < east
   std::string attribution;

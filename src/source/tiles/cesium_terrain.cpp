@@ -12,6 +12,7 @@
 #include "source/proj/vertical_datum.h"
 #include "source/tiles/cesium_layer.h"
 #include "source/tiles/height_decoders.h"
+#include "source/tiles/service_url.h"
 #include "source/tiles/tile_pyramid.h"
 #include "source/tiles/tile_template.h"
 #include "source/tiles/url_tiles.h"
@@ -21,8 +22,10 @@ namespace {
 
 constexpr std::chrono::seconds kPatience{30};
 
-/// What servers look at to send terrain; unless the user says otherwise.
-std::vector<std::string> with_accept(std::vector<std::string> headers) {
+/// The user's headers, for the server of the user's URL only, and what servers look at to send terrain, unless the user says otherwise.
+std::vector<std::string> headers_for(const std::string& tiles, const CesiumTerrain& terrain) {
+  std::vector<std::string> headers;
+  if (same_server(tiles, terrain.url)) headers = terrain.headers;
   const auto is_accept = [](std::string header) {
     std::transform(header.begin(), header.end(), header.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return header.starts_with("accept:");
@@ -37,7 +40,7 @@ Result<CesiumLayer> fetch_layer(const CesiumTerrain& terrain, fetch::ByteStore& 
   if (!text) return text.error();
   Result<CesiumLayer> layer = parse_cesium_layer(*text, terrain.url);
   if (layer) return layer;
-  const std::string why = fmt::format("{}: {}", fetch::public_part(terrain.url), layer.error().message);
+  const std::string why = fmt::format("{}: {}", fetch::public_part(terrain.url), without_secrets(layer.error().message, terrain.url, name));
   store.reject(name, why);
   return Error{layer.error().code, why};
 }
@@ -66,7 +69,8 @@ Result<std::unique_ptr<RasterSource>> open_cesium_terrain(const CesiumTerrain& t
   if (!address) return naming(address.error());
 
   TilePyramid pyramid;
-  pyramid.name = fetch::without_credentials(layer->url);  // with the version of the tiles, so that caches tell them apart
+  const std::string tiles = layer->url;
+  pyramid.name = fetch::without_credentials(tiles);  // with the version of the tiles, so that caches tell them apart
   pyramid.grid = std::move(*grid);
   pyramid.kind = SampleKind::height;
   pyramid.decode_heights = height_decoder(layer->format == TerrainFormat::heightmap ? kHeightmap : kQuantizedMesh, pyramid.grid);
@@ -79,7 +83,7 @@ Result<std::unique_ptr<RasterSource>> open_cesium_terrain(const CesiumTerrain& t
   const auto may_have = [layer = std::move(*layer), rows = std::move(rows)](const TileAddress& tile) {
     return layer.may_have(tile, rows[static_cast<std::size_t>(tile.zoom)]);
   };
-  pyramid.supply = url_tiles(std::move(*address), with_accept(terrain.headers), pyramid.name, pyramid.grid, std::move(store), may_have);
+  pyramid.supply = url_tiles(std::move(*address), headers_for(tiles, terrain), pyramid.name, pyramid.grid, std::move(store), may_have);
   return open_pyramid(std::move(pyramid), world);
 }
 

@@ -86,10 +86,13 @@ Result<std::unique_ptr<const FileParts>> open_local_parts(const std::filesystem:
   std::error_code failure;
   if (!std::filesystem::exists(file, failure)) return Error{ErrorCode::not_found, fmt::format("{}: no such file", name)};
   if (!std::filesystem::is_regular_file(file, failure)) return Error{ErrorCode::unsupported, fmt::format("{}: is no file", name)};
+  const Error closed{ErrorCode::unavailable, fmt::format("{}: cannot be opened; may it be read?", name)};
   const auto size = std::filesystem::file_size(file, failure);
+  if (failure) return closed;
   const auto written = std::filesystem::last_write_time(file, failure).time_since_epoch().count();
+  if (failure) return closed;
   const int opened = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (opened < 0 || failure) return Error{ErrorCode::unavailable, fmt::format("{}: cannot be opened; may it be read?", name)};
+  if (opened < 0) return closed;
   return std::unique_ptr<const FileParts>(std::make_unique<LocalParts>(opened, name, size, fmt::format("{}|{} {}", name, size, written), head_bytes));
 }
 

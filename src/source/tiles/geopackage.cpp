@@ -40,9 +40,7 @@ using TileScale = std::array<double, 2>;  ///< scale, offset
 
 struct TileTable {
   std::string name;
-  std::int64_t srs_id = 0;
   std::array<double, 4> extent{};  ///< least x, least y, largest x, largest y of the contents; NaN where it is not said
-  std::string attribution;
   std::optional<GriddedHeights> heights;
 };
 
@@ -108,11 +106,11 @@ Result<std::optional<GriddedHeights>> heights_of(const SqliteArchive& database, 
 Result<TileTable> find_table(const SqliteArchive& database, const TileArchive& archive) {
   const std::string& name = database.name();
   if (!database.has_table("gpkg_contents")) return Error{ErrorCode::unsupported, fmt::format("{}: has no gpkg_contents: it is no GeoPackage", name)};
-  const auto rows = database.rows("SELECT table_name, data_type, srs_id, min_x, min_y, max_x, max_y, description FROM gpkg_contents "
-                                  "WHERE data_type IN ('tiles', '2d-gridded-coverage') ORDER BY table_name", {}, 1000);
+  auto rows = database.rows("SELECT table_name, data_type, min_x, min_y, max_x, max_y FROM gpkg_contents WHERE data_type IN ('tiles', '2d-gridded-coverage')", {}, 1000);
   if (!rows) return rows.error();
   if (rows->empty())
     return Error{ErrorCode::unsupported, fmt::format("{}: holds no tiles, only features or tables, which are not drawn", name)};
+  std::sort(rows->begin(), rows->end(), [](const SqlRow& a, const SqlRow& b) { return text_of(a[0]) < text_of(b[0]); });
   std::vector<std::string> names;
   for (const SqlRow& row : *rows) names.push_back(text_of(row[0]));
   if (archive.table.empty() && rows->size() > 1)
@@ -121,8 +119,8 @@ Result<TileTable> find_table(const SqliteArchive& database, const TileArchive& a
   if (found == names.end())
     return Error{ErrorCode::not_found, fmt::format("{}: has no tiles in a table \"{}\", but in {}", name, archive.table, fmt::join(names, ", "))};
   const SqlRow& row = (*rows)[static_cast<std::size_t>(found - names.begin())];
-  TileTable table{*found, whole_of(row[2], -1), {}, {}, std::nullopt};
-  for (std::size_t i = 0; i < 4; ++i) table.extent[i] = number_of(row[3 + i], kNaN);
+  TileTable table{*found, {}, std::nullopt};
+  for (std::size_t i = 0; i < 4; ++i) table.extent[i] = number_of(row[2 + i], kNaN);
   if (text_of(row[1]) == "tiles") return table;
   if (archive.kind != SampleKind::height)
     return Error{ErrorCode::unsupported, fmt::format("{}: its table {} holds heights; show them as group = \"height\"", name, table.name)};
@@ -154,9 +152,12 @@ Result<std::pair<TileGrid, std::vector<std::int64_t>>> grid_of(const SqliteArchi
   Result<std::string> crs = crs_of(database, whole_of(sets->front()[0], -1));
   if (!crs) return crs.error();
   const glm::dvec2 corner(number_of(sets->front()[1], kNaN), number_of(sets->front()[2], kNaN));
-  const auto rows = database.rows("SELECT zoom_level, matrix_width, matrix_height, tile_width, tile_height, pixel_x_size, pixel_y_size FROM gpkg_tile_matrix "
-                                  "WHERE table_name = ? ORDER BY pixel_x_size DESC, zoom_level", {table.name}, 64);
+  auto rows = database.rows("SELECT zoom_level, matrix_width, matrix_height, tile_width, tile_height, pixel_x_size, pixel_y_size FROM gpkg_tile_matrix "
+                            "WHERE table_name = ?", {table.name}, 1000);
   if (!rows) return rows.error();
+  const auto coarseness = [](const SqlRow& row) { return std::pair(-number_of(row[5], 0.0), whole_of(row[0], -1)); };
+  std::sort(rows->begin(), rows->end(), [&](const SqlRow& a, const SqlRow& b) { return coarseness(a) < coarseness(b); });
+  rows->resize(std::min<std::size_t>(rows->size(), 64));
   TileGrid grid;
   grid.crs = std::move(*crs);
   std::vector<std::int64_t> zooms;
@@ -221,6 +222,7 @@ Result<std::unique_ptr<RasterSource>> open_geopackage(const TileArchive& archive
     pyramid.decode_heights = [heights = *table->heights](const std::string& bytes, const TileAddress&) { return gridded_heights(bytes, heights); };
   } else {
     pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
+    pyramid.encoding = archive.encoding;
   }
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_of_contents(*table, pyramid.grid, world);
   pyramid.vertical = archive.vertical;

@@ -109,10 +109,11 @@ Result<std::unique_ptr<RasterSource>> open_mbtiles(const TileArchive& archive, c
   pyramid.grid = std::move(*grid);
   pyramid.kind = archive.kind;
   pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
+  pyramid.encoding = archive.encoding;
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_in(said(*database, "bounds"));
   pyramid.vertical = archive.vertical;
   pyramid.is_remote = false;
-  pyramid.attribution = plain_text(said(*database, "attribution"));
+  pyramid.attribution = said(*database, "attribution");
   pyramid.supply = std::make_shared<const Mbtiles>(database);
   return open_pyramid(std::move(pyramid), world);
 }

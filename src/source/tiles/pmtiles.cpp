@@ -110,7 +110,7 @@ Result<Header> read_header(std::string_view bytes, std::uint64_t file_bytes) {
   header.metadata = range_at(bytes, 24);
   header.leaves = range_at(bytes, 40);
   header.tiles = range_at(bytes, 56);
-  if (header.root.length == 0 || !lies_within(header.root, std::min<std::uint64_t>(kHeadBytes, file_bytes)) || !lies_within(header.leaves, file_bytes) ||
+  if (header.root.length == 0 || !lies_within(header.root, std::min<std::uint64_t>({kHeadBytes, file_bytes, bytes.size()})) || !lies_within(header.leaves, file_bytes) ||
       !lies_within(header.tiles, file_bytes))
     return corrupt("its header points beyond its end: it is cut off or damaged");
   const Result<Compression> directories = compression_at(bytes, 97, "directories");

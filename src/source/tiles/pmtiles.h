@@ -35,7 +35,7 @@ struct Header {
   std::array<double, 4> bounds{};  ///< west, south, east, north in degrees
 };
 
-/// Reads the header. `file_bytes`: of the archive. Errors, to be completed by the archive's name: corrupt (no PMTiles, ranges outside of
+/// Reads the header. `bytes`: the archive's first ones, root directory included. `file_bytes`: of the archive. Errors, to be completed by the archive's name: corrupt (no PMTiles, ranges outside of
 /// the file, zooms), unsupported (version 1 or 2, vector tiles, compression by brotli or zstd).
 Result<Header> read_header(std::string_view bytes, std::uint64_t file_bytes);
 

@@ -143,7 +143,7 @@ std::string attribution_in(const std::string& head, const pmtiles::Header& heade
   const auto metadata = nlohmann::json::parse(text, nullptr, false);
   if (!metadata.is_object()) return {};
   const auto found = metadata.find("attribution");
-  return found != metadata.end() && found->is_string() ? plain_text(found->get<std::string>()) : std::string();
+  return found != metadata.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
 Result<std::string> PmtilesArchive::first_tile() const {
@@ -215,6 +215,7 @@ Result<std::unique_ptr<RasterSource>> open_pmtiles(const TileArchive& archive, c
   pyramid.grid = std::move(*grid);
   pyramid.kind = archive.kind;
   pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);
+  pyramid.encoding = archive.encoding;
   pyramid.bounds = archive.bounds ? archive.bounds : bounds_in(*header);
   pyramid.vertical = archive.vertical;
   pyramid.is_remote = remote;

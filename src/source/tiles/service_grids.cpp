@@ -5,10 +5,11 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
-
 
 namespace tellurion::source {
 namespace {
@@ -19,6 +20,8 @@ constexpr double kMetresPerDegree = geo::kWgs84.a() * std::numbers::pi / 180.0;
 constexpr double kMercatorHalf = std::numbers::pi * geo::kWgs84.a();
 constexpr double kMostPixels = 1 << 30;  ///< of a level, on a side
 constexpr int kMostLevels = 31;
+constexpr double kFarthest = 1e12;       ///< of a corner, in units of the CRS
+constexpr double kFinest = 1e-12;        ///< pixel
 
 /// How far it is round the body along x, for grids that may go round it; 0 for others.
 double way_round(const std::string& crs, const CrsAxes& axes) {
@@ -36,8 +39,8 @@ void snap_to_world(TileLevel& level, double way, int tile_width) {
 }
 
 bool fits(const TileLevel& level, int tile_width, int tile_height) {
-  return std::isfinite(level.pixel.x) && level.pixel.x > 0.0 && std::isfinite(level.corner.x) && std::isfinite(level.corner.y) &&
-         static_cast<double>(level.columns) * tile_width <= kMostPixels && static_cast<double>(level.rows) * tile_height <= kMostPixels;
+  return std::isfinite(level.pixel.x) && level.pixel.x >= kFinest && std::abs(level.corner.x) <= kFarthest && std::abs(level.corner.y) <= kFarthest &&
+         level.columns >= 1 && level.rows >= 1 && static_cast<double>(level.columns) * tile_width <= kMostPixels && static_cast<double>(level.rows) * tile_height <= kMostPixels;
 }
 
 double pixel_of(const TileMatrix& matrix, const CrsAxes& axes) {
@@ -65,13 +68,16 @@ std::pair<int, int> commonest_size(const std::vector<TileMatrix>& matrices) {
   return std::max_element(count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first;
 }
 
+using LimitsByMatrix = std::unordered_map<std::string_view, const TileMatrixLimits*>;
+
 /// The tiles that the limits allow; none if they leave the matrix out.
-std::optional<TileRange> range_of(const TileMatrix& matrix, const std::vector<TileMatrixLimits>& limits) {
+std::optional<TileRange> range_of(const TileMatrix& matrix, const LimitsByMatrix& limits) {
   const TileRange all{0, matrix.columns - 1, 0, matrix.rows - 1};
   if (limits.empty()) return all;
-  const auto limit = std::find_if(limits.begin(), limits.end(), [&](const TileMatrixLimits& l) { return l.matrix == matrix.identifier; });
-  if (limit == limits.end()) return std::nullopt;
-  const TileRange range{limit->least_column, std::min(limit->most_column, all.most_column), limit->least_row, std::min(limit->most_row, all.most_row)};
+  const auto found = limits.find(matrix.identifier);
+  if (found == limits.end()) return std::nullopt;
+  const TileMatrixLimits& limit = *found->second;
+  const TileRange range{limit.least_column, std::min(limit.most_column, all.most_column), limit.least_row, std::min(limit.most_row, all.most_row)};
   if (range.least_column > range.most_column || range.least_row > range.most_row) return std::nullopt;
   return range;
 }
@@ -90,18 +96,21 @@ Result<MatrixGrid> matrix_grid(const TileMatrixSet& set, const std::vector<TileM
   std::stable_sort(matrices.begin(), matrices.end(), [](const auto& a, const auto& b) { return a.scale_denominator > b.scale_denominator; });
   MatrixGrid made;
   made.grid.crs = crs;
+  LimitsByMatrix by_matrix;
+  for (const TileMatrixLimits& limit : limits) by_matrix.emplace(limit.matrix, &limit);
   if (!matrices.empty()) std::tie(made.grid.tile_width, made.grid.tile_height) = commonest_size(matrices);
   for (const TileMatrix& matrix : matrices) {
+    if (made.grid.levels.size() == kMostLevels) break;
     TileLevel level;
     level.corner = corner_of(matrix, axes, inside);
     level.pixel = glm::dvec2(pixel_of(matrix, axes));
     level.columns = matrix.columns;
     level.rows = matrix.rows;
     snap_to_world(level, way_round(crs, axes), matrix.tile_width);
-    const std::optional<TileRange> range = range_of(matrix, limits);
+    const std::optional<TileRange> range = range_of(matrix, by_matrix);
     const bool same_size = matrix.tile_width == made.grid.tile_width && matrix.tile_height == made.grid.tile_height;
     const bool finer = made.grid.levels.empty() || level.pixel.x < 0.999 * made.grid.levels.back().pixel.x;
-    if (!range || !same_size || !finer || !fits(level, matrix.tile_width, matrix.tile_height) || made.grid.levels.size() == kMostLevels) continue;
+    if (!range || !same_size || !finer || !fits(level, matrix.tile_width, matrix.tile_height)) continue;
     made.grid.levels.push_back(level);
     made.matrices.push_back(matrix.identifier);
     made.ranges.push_back(*range);
@@ -181,10 +190,10 @@ Result<TmsGrid> tms_grid(const TmsResource& map, const CrsAxes& axes, const std:
     const double left = std::floor((extent.box[0] - extent.origin.x) / tile.x + 1e-6), right = std::ceil((extent.box[2] - extent.origin.x) / tile.x - 1e-6);
     const double bottom = std::floor((extent.box[1] - extent.origin.y) / tile.y + 1e-6), top = std::ceil((extent.box[3] - extent.origin.y) / tile.y - 1e-6);
     const double most = kMostPixels / std::max(map.tile_width, map.tile_height);
-    if (!(left >= 0.0 && bottom >= 0.0 && right > left && top > bottom && right <= most && top <= most)) continue;
     // Columns count from the map's origin; where that is the antimeridian they go all round.
-    const auto columns = static_cast<std::int64_t>(way > 0.0 ? std::max(std::round(way / tile.x), right) : right);
-    TileLevel made_level{{extent.origin.x, extent.origin.y + top * tile.y}, glm::dvec2(level.units_per_pixel), columns, static_cast<std::int64_t>(top)};
+    const double columns = way > 0.0 ? std::max(std::round(way / tile.x), right) : right;
+    if (!(left >= 0.0 && bottom >= 0.0 && right > left && top > bottom && columns >= right && columns <= most && top <= most)) continue;
+    TileLevel made_level{{extent.origin.x, extent.origin.y + top * tile.y}, glm::dvec2(level.units_per_pixel), static_cast<std::int64_t>(columns), static_cast<std::int64_t>(top)};
     snap_to_world(made_level, way, map.tile_width);
     made_level.corner.y = extent.origin.y + top * made_level.pixel.y * map.tile_height;
     const bool finer = made.grid.levels.empty() || made_level.pixel.x < 0.999 * made.grid.levels.back().pixel.x;

@@ -23,7 +23,7 @@ namespace tellurion::source {
 /// calls them EPSG:4326.
 std::string grid_crs(const std::string& crs, const CrsAxes& axes, const geo::Ellipsoid& world);
 
-/// The tiles of one level that there are, both ends included.
+/// The tiles of one level that there are, rows from the north, both ends included.
 struct TileRange {
   std::int64_t least_column = 0, most_column = 0, least_row = 0, most_row = 0;
   bool contains(const TileAddress& tile) const {

@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
+#include "base/hash.h"
 #include "fetch/fetch_now.h"
 #include "source/tiles/bounded_xml.h"
 #include "source/tiles/height_decoders.h"
-#include "source/tiles/service_url.h"
 
 namespace tellurion::source {
 namespace {
@@ -34,27 +34,29 @@ std::optional<std::string> refusal(const std::string& url, const std::string& by
 
 class ServiceTiles final : public TileSupply {
  public:
-  ServiceTiles(UrlOfTile url_of, std::vector<std::string> headers, std::string key_prefix, std::shared_ptr<fetch::ByteStore> store)
-      : url_of_(std::move(url_of)), headers_(std::move(headers)), key_prefix_(std::move(key_prefix)), store_(std::move(store)) {}
+  ServiceTiles(UrlOfTile url_of, const ServiceOptions& options, const Parameters& dimensions, std::shared_ptr<fetch::ByteStore> store)
+      : url_of_(std::move(url_of)), given_(options.url), headers_(options.headers), mark_(mark_of(dimensions)), store_(std::move(store)) {}
 
   fetch::Asked ask(const TileAddress& tile, const TileWish& wish) const override {
     const std::string url = url_of_(tile);
     if (url.empty()) return fetch::File{};
     const auto refuse = [url](const std::string& bytes) { return refusal(url, bytes); };
-    fetch::Asked asked = store_->ask({url, headers_, key_of(tile), {}, wish.expected_bytes, {}, refuse}, wish.gain);
+    const std::vector<std::string> headers = same_server(url, given_) ? headers_ : std::vector<std::string>();
+    fetch::Asked asked = store_->ask({url, headers, key_of(url), {}, wish.expected_bytes, {}, refuse}, wish.gain);
     const auto* file = std::get_if<fetch::File>(&asked);
     if (file && file->bytes && is_out_of_range(*file->bytes)) return fetch::File{};
     return asked;
   }
-  void reject(const TileAddress& tile, const std::string& why) const override { store_->reject(key_of(tile), why); }
+  void reject(const TileAddress& tile, const std::string& why) const override { store_->reject(key_of(url_of_(tile)), why); }
   std::string name_of(const TileAddress& tile) const override { return fmt::format("{} (tile {}/{}/{})", fetch::public_part(url_of_(tile)), tile.zoom, tile.column, tile.row); }
 
  private:
-  std::string key_of(const TileAddress& tile) const { return fmt::format("{}/{}/{}/{}", key_prefix_, tile.zoom, tile.column, tile.row); }
+  std::string key_of(const std::string& url) const { return fetch::without_credentials(url) + mark_; }
 
   UrlOfTile url_of_;
+  std::string given_;  ///< by the user
   std::vector<std::string> headers_;
-  std::string key_prefix_;
+  std::string mark_;   ///< see mark_of
   std::shared_ptr<fetch::ByteStore> store_;
 };
 
@@ -82,9 +84,22 @@ Result<std::string> fetch_document_bytes(const std::string& url, const std::vect
   return fetch::fetch_now(store, {url, headers, fetch::without_credentials(url), {}}, kLongestWait);
 }
 
-std::shared_ptr<const TileSupply> service_tiles(UrlOfTile url_of, std::vector<std::string> headers, std::string key_prefix,
+Error reject_document(const std::string& url, const Error& error, fetch::ByteStore& store) {
+  const std::string shown = fetch::without_credentials(url);
+  const Error why = naming(shown, {error.code, without_secrets(error.message, url, shown)});
+  store.reject(shown, why.message);
+  return why;
+}
+
+std::shared_ptr<const TileSupply> service_tiles(UrlOfTile url_of, const ServiceOptions& options, const Parameters& dimensions,
                                                 std::shared_ptr<fetch::ByteStore> store) {
-  return std::make_shared<ServiceTiles>(std::move(url_of), std::move(headers), std::move(key_prefix), std::move(store));
+  return std::make_shared<ServiceTiles>(std::move(url_of), options, dimensions, std::move(store));
+}
+
+std::string mark_of(const Parameters& dimensions) {
+  std::string text;
+  for (const auto& [name, value] : dimensions) text += fmt::format("{}={}\n", name, value);
+  return text.empty() ? text : fmt::format("#{:016x}", fnv1a(text));
 }
 
 Result<std::string> choose_format(const ServiceOptions& options, const std::vector<std::string>& formats, bool opaque) {
@@ -126,6 +141,7 @@ Result<std::unique_ptr<RasterSource>> open_service(TilePyramid pyramid, const Se
   if (const Result<void> kept = keep_levels(pyramid.grid, options); !kept) return naming(pyramid.name, kept.error());
   pyramid.kind = options.kind;
   pyramid.decode_heights = height_decoder(options.encoding, pyramid.grid);
+  pyramid.encoding = options.encoding;
   pyramid.sample_type = options.kind == SampleKind::height && options.encoding.empty() ? "Float32" : "Byte";
   pyramid.vertical = options.vertical;
   pyramid.is_remote = true;

@@ -9,6 +9,7 @@
 #include "base/result.h"
 #include "fetch/byte_store.h"
 #include "source/tiles/service_source.h"
+#include "source/tiles/service_url.h"
 #include "source/tiles/tile_pyramid.h"
 #include "source/tiles/tile_supply.h"
 
@@ -26,11 +27,15 @@ template <class Parsed>
 Result<Parsed> fetch_document(const std::string& url, const std::vector<std::string>& headers, fetch::ByteStore& store,
                               Result<Parsed> (*parse)(std::string_view));
 
-/// Tiles by URL. `url_of`: empty for a tile that there is not. What is an exception of the service instead of a picture becomes an
-/// error and is not kept. `key_prefix` holds no credentials.
+/// Tiles by URL; the URL without credentials is their key in caches. `url_of`: empty for a tile that there is not. What is an exception of
+/// the service instead of a picture becomes an error and is not kept. The options' headers go to the server of their URL only.
+/// `dimensions`: those of the tiles, whose names may look like those of credentials.
 using UrlOfTile = std::function<std::string(const TileAddress&)>;
-std::shared_ptr<const TileSupply> service_tiles(UrlOfTile url_of, std::vector<std::string> headers, std::string key_prefix,
+std::shared_ptr<const TileSupply> service_tiles(UrlOfTile url_of, const ServiceOptions& options, const Parameters& dimensions,
                                                 std::shared_ptr<fetch::ByteStore> store);
+
+/// Tells apart what differs by its dimensions only; empty without any. Does not show their values.
+std::string mark_of(const Parameters& dimensions);
 
 /// The format to ask for, of those that there are. Errors: invalid_argument (the one wanted is not there).
 Result<std::string> choose_format(const ServiceOptions& options, const std::vector<std::string>& formats, bool opaque);
@@ -46,16 +51,17 @@ Result<std::unique_ptr<RasterSource>> open_service(TilePyramid pyramid, const Se
 /// A document's bytes: see fetch_document.
 Result<std::string> fetch_document_bytes(const std::string& url, const std::vector<std::string>& headers, fetch::ByteStore& store);
 
+/// The document is not kept. Returns what is wrong with it, without secrets that it repeats.
+Error reject_document(const std::string& url, const Error& error, fetch::ByteStore& store);
+
 template <class Parsed>
 Result<Parsed> fetch_document(const std::string& url, const std::vector<std::string>& headers, fetch::ByteStore& store,
                               Result<Parsed> (*parse)(std::string_view)) {
   const Result<std::string> bytes = fetch_document_bytes(url, headers, store);
   if (!bytes) return bytes.error();
   Result<Parsed> parsed = parse(*bytes);
-  if (parsed) return parsed;
-  const Error error = naming(fetch::without_credentials(url), parsed.error());
-  store.reject(fetch::without_credentials(url), error.message);
-  return error;
+  if (!parsed) return reject_document(url, parsed.error(), store);
+  return parsed;
 }
 
 }  // namespace tellurion::source

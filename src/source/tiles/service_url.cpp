@@ -38,14 +38,20 @@ std::vector<std::string_view> query_parts(std::string_view url) {
 
 std::string name_of_part(std::string_view part) { return lower(part.substr(0, part.find('='))); }
 
-/// "host:port", without who asks.
-std::string host_of(std::string_view url) {
+/// "scheme://host:port", without who asks; empty if there is none.
+std::string server_of(std::string_view url) {
   const std::size_t start = url.find("://");
   if (start == std::string_view::npos) return {};
   std::string_view host = url.substr(start + 3);
   host = host.substr(0, host.find_first_of("/?#"));
   if (const std::size_t user = host.rfind('@'); user != std::string_view::npos) host.remove_prefix(user + 1);
-  return lower(host);
+  const std::string scheme = lower(url.substr(0, start));
+  const std::size_t colon = host.rfind(':');
+  const bool has_port = colon != std::string_view::npos && host.find(']', colon) == std::string_view::npos;
+  std::string port(has_port ? host.substr(colon + 1) : "");
+  if (port.empty()) port = scheme == "https" ? "443" : "80";
+  host = host.substr(0, has_port ? colon : host.size());
+  return host.empty() ? std::string() : fmt::format("{}://{}:{}", scheme, lower(host), port);
 }
 
 std::string joined(std::string_view url, const std::vector<std::string>& parts) {
@@ -87,8 +93,13 @@ std::string with_parameters(std::string_view url, const Parameters& parameters) 
   return joined(url, parts);
 }
 
+bool same_server(std::string_view a, std::string_view b) {
+  const std::string server = server_of(a);
+  return !server.empty() && server == server_of(b);
+}
+
 std::string with_given_parameters(std::string_view url, std::string_view given) {
-  if (host_of(url) != host_of(given) || host_of(url).empty()) return std::string(url);
+  if (!same_server(url, given)) return std::string(url);
   std::vector<std::string> parts;
   for (const std::string_view part : query_parts(url)) parts.emplace_back(part);
   for (const std::string_view part : query_parts(given)) {
@@ -110,10 +121,11 @@ std::string without_secrets(std::string message, std::string_view url, std::stri
 }
 
 std::string resolved_url(std::string_view base, std::string_view reference) {
-  if (reference.starts_with("http://") || reference.starts_with("https://")) return std::string(reference);
+  if (reference.find("://") < reference.find_first_of("/?#")) return std::string(reference);
   base = without_fragment(base).substr(0, base.find('?'));
   const std::size_t start = base.find("://");
   const std::size_t root = start == std::string_view::npos ? 0 : std::min(base.find('/', start + 3), base.size());
+  if (reference.starts_with("//")) return std::string(base.substr(0, start == std::string_view::npos ? 0 : start + 1)) + std::string(reference);
   if (reference.starts_with("/")) return std::string(base.substr(0, root)) + std::string(reference);
   while (reference.starts_with("./")) reference.remove_prefix(2);
   const std::size_t folder = base.rfind('/');

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -19,9 +20,10 @@ namespace tellurion::source {
 namespace {
 
 constexpr int kMostValueBytes = 16 << 20;   ///< of a text or blob
+constexpr std::size_t kMostAnswerBytes = std::size_t{2} * kMostValueBytes;  ///< of all texts and blobs that a query gives
 constexpr std::size_t kMostStatements = 16; ///< kept prepared
-constexpr int kStepsBetween = 10'000;       ///< of SQLite's machine, between two counts
-constexpr int kMostCounts = 1'000;          ///< a query of ten million steps (half a second or so) is given up
+constexpr int kStepsBetween = 1'000;        ///< of SQLite's machine, between two looks at the clock
+constexpr std::chrono::seconds kLongestQuery{3};
 
 struct DatabaseDeleter {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
@@ -72,7 +74,9 @@ SqlValue value_at(sqlite3_stmt* statement, int column) {
     case SQLITE_NULL: return std::monostate{};
     default: break;
   }
-  const void* data = sqlite3_column_blob(statement, column);
+  // Text comes as UTF-8, whatever the database's own encoding.
+  const bool is_text = sqlite3_column_type(statement, column) == SQLITE_TEXT;
+  const void* data = is_text ? sqlite3_column_text(statement, column) : sqlite3_column_blob(statement, column);
   const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
   return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
 }
@@ -91,7 +95,7 @@ struct SqliteArchive::State {
   std::mutex mutex;  ///< guards what follows
   std::unique_ptr<sqlite3, DatabaseDeleter> database;
   std::map<std::string, Statement> statements;  ///< by their text
-  int counts = 0;
+  std::chrono::steady_clock::time_point deadline;  ///< of the query that runs
 
   Error error(int status) const;
   sqlite3_stmt* prepared(const std::string& query, int& status);
@@ -152,7 +156,8 @@ Result<std::unique_ptr<SqliteArchive>> SqliteArchive::open(const std::filesystem
   sqlite3_limit(database, SQLITE_LIMIT_ATTACHED, 0);
   sqlite3_limit(database, SQLITE_LIMIT_EXPR_DEPTH, 50);
   sqlite3_limit(database, SQLITE_LIMIT_COMPOUND_SELECT, 20);
-  sqlite3_progress_handler(database, kStepsBetween, [](void* s) { return ++static_cast<State*>(s)->counts > kMostCounts ? 1 : 0; }, state.get());
+  sqlite3_limit(database, SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 50);
+  sqlite3_progress_handler(database, kStepsBetween, [](void* s) { return std::chrono::steady_clock::now() > static_cast<State*>(s)->deadline ? 1 : 0; }, state.get());
   sqlite3_exec(database, "PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0", nullptr, nullptr, nullptr);
   sqlite3_set_authorizer(database, may_do, nullptr);
   std::unique_ptr<SqliteArchive> archive(new SqliteArchive(std::move(state)));
@@ -163,21 +168,27 @@ Result<std::unique_ptr<SqliteArchive>> SqliteArchive::open(const std::filesystem
 Result<std::vector<SqlRow>> SqliteArchive::rows(const std::string& query, std::initializer_list<SqlValue> values, std::size_t most_rows) const {
   State& s = *state_;
   std::lock_guard lock(s.mutex);
-  s.counts = 0;
+  s.deadline = std::chrono::steady_clock::now() + kLongestQuery;
   int status = SQLITE_OK;
   sqlite3_stmt* statement = s.prepared(query, status);
   if (statement == nullptr) return s.error(status);
   int place = 0;
   for (const SqlValue& value : values) bind(statement, ++place, value);
   std::vector<SqlRow> found;
-  while (found.size() < most_rows && (status = sqlite3_step(statement)) == SQLITE_ROW) {
+  std::size_t bytes = 0;
+  while (bytes <= kMostAnswerBytes && found.size() < most_rows && (status = sqlite3_step(statement)) == SQLITE_ROW) {
     SqlRow row;
-    for (int column = 0; column < sqlite3_column_count(statement); ++column) row.push_back(value_at(statement, column));
+    for (int column = 0; column < sqlite3_column_count(statement) && bytes <= kMostAnswerBytes; ++column) {
+      row.push_back(value_at(statement, column));
+      if (const auto* text = std::get_if<std::string>(&row.back())) bytes += text->size();
+    }
     found.push_back(std::move(row));
   }
   const bool good = status == SQLITE_ROW || status == SQLITE_DONE || status == SQLITE_OK;
   std::optional<Error> error;
   if (!good) error = s.error(status);
+  if (bytes > kMostAnswerBytes)
+    error = Error{ErrorCode::exhausted, fmt::format("{}: has rows of more than {} MB together where a few lines should be", s.name, kMostAnswerBytes >> 20)};
   sqlite3_reset(statement);
   sqlite3_clear_bindings(statement);
   if (error) return std::move(*error);

@@ -27,8 +27,8 @@ class SqliteArchive {
   SqliteArchive(const SqliteArchive&) = delete;
   SqliteArchive& operator=(const SqliteArchive&) = delete;
 
-  /// The first `most_rows` rows of a query whose `?` stand for `values`.
-  /// Errors, naming the file: corrupt; unsupported (no such table or column); exhausted (takes too long or too much memory).
+  /// The first `most_rows` rows of a query whose `?` stand for `values`; texts in UTF-8.
+  /// Errors, naming the file: corrupt; unsupported (no such table or column); exhausted (takes seconds, or the rows hold more than 32 MB).
   Result<std::vector<SqlRow>> rows(const std::string& query, std::initializer_list<SqlValue> values, std::size_t most_rows) const;
   bool has_table(const std::string& name) const;  ///< or view
 

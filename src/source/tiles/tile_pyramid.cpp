@@ -6,12 +6,14 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "source/gdal/picture_file.h"
 #include "source/grid_coverage.h"
 #include "source/proj/pixel_mapping.h"
 #include "source/proj/projection.h"
 #include "source/proj/vertical_datum.h"
+#include "source/tiles/archive_tile.h"
 #include "source/tiles/tile_reader.h"
 
 namespace tellurion::source {
@@ -27,7 +29,15 @@ class PyramidSource final : public RasterSource {
 
   const RasterDescription& description() const override { return layout_->description; }
   const Coverage& coverage() const override { return coverage_; }
-  std::string revision() const override { return layout_->pyramid.revision.empty() ? layout_->pyramid.name : layout_->pyramid.revision; }
+  /// With all that makes other heights of the same tiles.
+  std::string revision() const override {
+    const TilePyramid& pyramid = layout_->pyramid;
+    std::string text = pyramid.revision.empty() ? pyramid.name : pyramid.revision;
+    if (!pyramid.encoding.empty()) text += fmt::format("|encoding={}", pyramid.encoding);
+    if (pyramid.vertical) text += fmt::format("|vertical={}", *pyramid.vertical);
+    if (pyramid.bounds) text += fmt::format("|bounds={}", fmt::join(*pyramid.bounds, ","));
+    return text;
+  }
   Result<std::unique_ptr<RasterReader>> open_reader() const override {
     Result<PixelMapping> mapping = PixelMapping::create(layout_->georeference, layout_->world);
     if (!mapping) return mapping.error();
@@ -104,18 +114,21 @@ Result<PixelRange> range_of(const std::array<double, 4>& bounds, glm::dvec2 size
 }
 
 /// Of heights: what they are above. Returns what VerticalDatum::create takes; nothing for the ellipsoid.
-Result<std::string> find_datum(const std::optional<std::string>& vertical, bool on_earth, RasterDescription& about) {
-  about.vertical = vertical.value_or(kEllipsoidDatum);
-  about.vertical_declared = vertical.has_value();
-  if (about.kind != SampleKind::height) return std::string();
-  if (!vertical) {
+/// A vertical part of the CRS counts unless `vertical` says otherwise.
+Result<std::string> find_datum(const std::optional<std::string>& vertical, const CrsFacts& facts, bool on_earth, RasterDescription& about) {
+  const std::string wanted = vertical.value_or(facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : about.crs_wkt);
+  about.vertical = kEllipsoidDatum;
+  about.vertical_declared = !wanted.empty();
+  if (wanted == kEllipsoidDatum || about.kind != SampleKind::height) return std::string();
+  if (wanted.empty()) {
     about.hints.push_back(fmt::format("{} declares no vertical datum: its heights are taken as above the ellipsoid, which can be 100 m off; "
                                       "say vertical = \"ellipsoid\", \"egm96\" or another in the world file.", about.name));
+    return std::string();
   }
-  if (about.vertical == kEllipsoidDatum) return std::string();
-  if (!on_earth) return Error{ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", about.vertical)};
-  if (const Result<VerticalDatum> datum = VerticalDatum::create(about.vertical); !datum) return datum.error();
-  return about.vertical;
+  if (!on_earth) return Error{ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", wanted)};
+  if (const Result<VerticalDatum> datum = VerticalDatum::create(wanted); !datum) return datum.error();
+  about.vertical = vertical.value_or(facts.vertical);
+  return wanted;
 }
 
 }  // namespace
@@ -159,14 +172,14 @@ Result<std::unique_ptr<RasterSource>> open_pyramid(TilePyramid pyramid, const ge
   about.name = pyramid.name;
   about.kind = pyramid.kind;
   about.is_remote = pyramid.is_remote;
-  about.attribution = pyramid.attribution;
+  about.attribution = plain_text(pyramid.attribution);
   about.wraps = mapping->wraps();
   about.band_count = pyramid.kind == SampleKind::height ? 1 : 4;
   about.sample_type = pyramid.sample_type;
   about.crs_name = mapping->facts().name;
   about.crs_wkt = grid.crs;
   about.ellipsoid = mapping->facts().ellipsoid;
-  Result<std::string> datum = find_datum(pyramid.vertical, is_earth(world), about);
+  Result<std::string> datum = find_datum(pyramid.vertical, mapping->facts(), is_earth(world), about);
   if (!datum) return naming(datum.error());
   layout->vertical = std::move(*datum);
 

@@ -25,15 +25,16 @@ HeightDecoder picture_heights(std::optional<raster::HeightCode> code);
 
 struct TilePyramid {
   std::string name;              ///< as messages and caches' keys name it: without credentials
-  std::string revision{};        ///< names the content, as RasterSource::revision; empty: the name does
+  std::string revision{};        ///< names the tiles' content; empty: the name does
   TileGrid grid;
   SampleKind kind = SampleKind::colour;
   HeightDecoder decode_heights;  ///< for SampleKind::height
+  std::string encoding{};        ///< the decoder's name in the world file; counts for RasterSource::revision
   std::string sample_type = "Byte";             ///< for people: "Float32", ...
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees, west < east: nothing lies outside
   std::optional<std::string> vertical;          ///< as GdalOptions::vertical
   bool is_remote = true;
-  std::string attribution;       ///< whom to credit
+  std::string attribution;       ///< whom to credit; may be HTML
   std::shared_ptr<const TileSupply> supply;
 };
 

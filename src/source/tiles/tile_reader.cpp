@@ -14,6 +14,7 @@
 #include "raster/box_average.h"
 #include "source/gdal/picture_file.h"
 #include "source/proj/raise_heights.h"
+#include "source/undeclared_voids.h"
 
 namespace tellurion::source {
 namespace {
@@ -84,11 +85,17 @@ LevelTransform then(const LevelTransform& first, const LevelTransform& second) {
   return {first.scale * second.scale, first.offset * second.scale + second.offset};
 }
 
+/// As a whole number between both, which are whole; `least` if it is no number.
+double between(double number, double least, double most) { return number >= least ? std::min(std::floor(number), most) : least; }
+
 /// The pixels from `from` up to `to` whose centres map into [lower, upper).
 std::pair<int, int> centres_within(double lower, double upper, double scale, double offset, int from, int to) {
-  const auto first = [&](double edge) { return std::ceil((edge - offset) / scale - 0.5); };
-  return {static_cast<int>(std::clamp<double>(first(lower), from, to)), static_cast<int>(std::clamp<double>(first(upper), from, to))};
+  const auto first = [&](double edge) { return static_cast<int>(between(std::ceil((edge - offset) / scale - 0.5), from, to)); };
+  return {first(lower), first(upper)};
 }
+
+/// Whether each pixel is one of the other level.
+bool is_pixel_to_pixel(const LevelTransform& transform) { return transform.scale == glm::dvec2(1.0) && transform.offset == glm::floor(transform.offset); }
 
 }  // namespace
 
@@ -128,6 +135,10 @@ Result<Data> TileReader::decode(const std::string& bytes, const TileAddress& add
     if (tile) premultiply(*tile);
   } else {
     tile = pyramid.decode_heights(bytes, address);
+    const double limit = height_limit(layout_->world);
+    for (std::size_t i = 0; tile && i < tile->metres.size(); ++i) {
+      if (!(std::abs(static_cast<double>(tile->metres[i])) <= limit)) tile->metres[i] = raster::kNoHeight;
+    }
   }
   const TileGrid& grid = pyramid.grid;
   if (tile && (tile->width != grid.tile_width || tile->height != grid.tile_height))
@@ -164,7 +175,8 @@ Result<Frozen<Data>> TileReader::tile(const TileAddress& address) {
       const bool page = file.content_type.starts_with("text/");
       const std::string why = fmt::format("{}: {}{}", supply.name_of(address), decoded.error().message, page ? " (a page of text; is the URL right?)" : "");
       supply.reject(address, why);
-      return Error{ErrorCode::unavailable, why};
+      // A server may mend it; a file is what it is.
+      return Error{layout_->pyramid.is_remote ? ErrorCode::unavailable : decoded.error().code, why};
     }
     tile = freeze(std::move(*decoded));
   }
@@ -180,7 +192,7 @@ Result<void> TileReader::fill(int zoom, const LevelTransform& to_level, const Pi
   const TileGrid& grid = layout_->pyramid.grid;
   const TileLevel& level = grid.levels[static_cast<std::size_t>(zoom)];
   const glm::dvec2 side(grid.tile_width, grid.tile_height), s = to_level.scale, o = to_level.offset;
-  const auto index = [](double pixel, double size, std::int64_t count) { return std::clamp(static_cast<std::int64_t>(std::floor(pixel / size)), std::int64_t{-1}, count); };
+  const auto index = [](double pixel, double size, std::int64_t count) { return static_cast<std::int64_t>(between(pixel / size, -1.0, static_cast<double>(count))); };
   const glm::dvec2 first = to_level(glm::dvec2(part.x, part.y) + 0.5), last = to_level(glm::dvec2(part.x + part.width, part.y + part.height) - 0.5);
   const LevelTransform to_full = transform_between(level, layout_->level_of_raster(0));
   std::optional<Error> pending;
@@ -203,7 +215,7 @@ Result<void> TileReader::fill(int zoom, const LevelTransform& to_level, const Pi
         const Result<void> filled = fill(zoom - 1, up, PixelWindow{x0, y0, x1 - x0, y1 - y0}, window, out);
         if (!filled && filled.error().code != ErrorCode::pending) return filled;
         if (!filled) pending = filled.error();
-      } else if (s == glm::dvec2(1.0)) {
+      } else if (is_pixel_to_pixel(to_level)) {
         const glm::ivec2 from(glm::dvec2(x0, y0) + o - lower);
         for (int y = y0; y < y1; ++y) copy_row(**found, from.x, from.y + y - y0, out, x0 - window.x, y - window.y, x1 - x0);
       } else {
@@ -234,12 +246,15 @@ Result<Data> TileReader::read(int level, const PixelWindow& window) {
   const auto pixel_of = [&](int of) { return grid.levels[static_cast<std::size_t>(of)].pixel; };
   while (zoom > grid.min_zoom && pixel_of(zoom - 1).x <= here.pixel.x * kSame && pixel_of(zoom - 1).y <= here.pixel.y * kSame) --zoom;
   const LevelTransform to_tiles = snapped(transform_between(here, grid.levels[static_cast<std::size_t>(zoom)]), layout_->description.levels[static_cast<std::size_t>(level)]);
-  if (to_tiles.scale == glm::dvec2(1.0)) return assemble<Data>(zoom, to_tiles, window);
+  if (is_pixel_to_pixel(to_tiles)) return assemble<Data>(zoom, to_tiles, window);
 
   const glm::dvec2 step = glm::max(to_tiles.scale, glm::dvec2(1.0));
   if (std::max(step.x, step.y) > (1 << kMostAveraged) * kSame) return void_of(window, static_cast<const Data*>(nullptr));
   const glm::dvec2 corner = to_tiles(glm::dvec2(window.x, window.y));
-  const glm::ivec2 first(glm::floor(corner)), last(glm::ceil(corner + step * glm::dvec2(window.width, window.height)));
+  const glm::dvec2 end = corner + step * glm::dvec2(window.width, window.height);
+  constexpr double kFarthest = 1 << 30;  // no tiles have pixels beyond
+  if (!(corner.x >= -kFarthest && corner.y >= -kFarthest && end.x <= kFarthest && end.y <= kFarthest)) return void_of(window, static_cast<const Data*>(nullptr));
+  const glm::ivec2 first(glm::floor(corner)), last(glm::ceil(end));
   raster::BoxAverage average({window.width, window.height, corner.x, corner.y, step.x, step.y});
   const Result<Data> samples = assemble<Data>(zoom, LevelTransform{}, {first.x, first.y, last.x - first.x, last.y - first.y});
   if (!samples) return samples.error();

@@ -17,10 +17,11 @@ Result<TileTemplate> TileTemplate::parse(const std::string& text, std::vector<st
   const auto has = [&](Field field) { return std::any_of(made.pieces_.begin(), made.pieces_.end(), [&](const Piece& p) { return p.field == field; }); };
   for (std::size_t open = text.find('{'); open != std::string::npos; open = text.find('{', at)) {
     const std::size_t close = text.find('}', open);
-    const std::string name = close == std::string::npos ? text.substr(open) : text.substr(open + 1, close - open - 1);
+    const std::string name = text.substr(open + 1, close == std::string::npos ? close : close - open - 1);
     const auto* known = std::find_if(std::begin(kFields), std::end(kFields), [&](const auto& field) { return field.first == name; });
     if (close == std::string::npos || known == std::end(kFields))
-      return Error{ErrorCode::invalid_argument, fmt::format("{{{}}} means nothing in a tile URL: it knows {{z}}, {{x}}, {{y}}, {{-y}}, {{q}} and {{s}}", name)};
+      return Error{ErrorCode::invalid_argument, fmt::format("{{{}}} means nothing in a tile URL: it knows {{z}}, {{x}}, {{y}}, {{-y}}, {{q}} and {{s}}",
+                                                              name.substr(0, name.find_first_of("?&/. {")))};  // without a } a key may follow
     made.pieces_.push_back({text.substr(at, open - at), known->second});
     at = close + 1;
   }

@@ -23,6 +23,7 @@ Result<std::unique_ptr<RasterSource>> open_tiles(const TileService& service, con
   pyramid.grid = std::move(*grid);
   pyramid.kind = service.kind;
   pyramid.decode_heights = height_decoder(service.encoding, pyramid.grid);
+  pyramid.encoding = service.encoding;
   if (service.kind == SampleKind::height && !raster::height_code(service.encoding)) pyramid.sample_type = "Float32";
   pyramid.bounds = service.bounds;
   pyramid.vertical = service.vertical;

@@ -20,7 +20,6 @@ std::optional<TmsResource::Level> read_level(const pugi::xml_node& node) {
   const double order = attribute_number(node, "order").value_or(-1);
   // gdal2tiles 2.1 writes an order -1, of which there are no tiles.
   if (level.href.empty() || !(level.units_per_pixel > 0) || order < 0 || order > kDeepest || order != std::floor(order)) return std::nullopt;
-  level.order = static_cast<int>(order);
   return level;
 }
 

@@ -18,7 +18,6 @@ struct TmsResource {
   struct Level {
     std::string href;          ///< of its tiles: relative to the document, or whole
     double units_per_pixel = 0;  ///< greater than 0
-    int order = 0;
   };
   std::string title;
   std::string attribution;

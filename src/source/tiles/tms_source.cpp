@@ -53,7 +53,7 @@ Result<std::unique_ptr<RasterSource>> open_tms(const ServiceOptions& options, co
     if (!ranges[level].contains(tile)) return std::string();
     return with_given_parameters(fmt::format("{}{}/{}.{}", folders[level], tile.column, south_rows[level] - tile.row, extension), url);
   };
-  pyramid.supply = service_tiles(url_of, options.headers, pyramid.name, std::move(store));
+  pyramid.supply = service_tiles(url_of, options, {}, std::move(store));
   return open_service(std::move(pyramid), options, grid->bounds, world);
 }
 

@@ -52,7 +52,6 @@ WmsLayer read_layer(const pugi::xml_node& node, int parent) {
   WmsLayer layer;
   layer.parent = parent;
   layer.name = child_text(node, "Name");
-  layer.title = child_text(node, "Title");
   layer.attribution = child_text(child(node, "Attribution"), "Title");
   for (const char* name : {"CRS", "SRS"}) {
     for (const pugi::xml_node& crs : children(node, name)) {

@@ -20,7 +20,6 @@ struct WmsLayer {
   };
   int parent = -1;               ///< its place in the list; -1: none
   std::string name;              ///< empty: only a title over others
-  std::string title;
   std::string attribution;
   std::vector<std::string> crs;  ///< as written
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -80,12 +81,15 @@ Result<void> check_styles(const std::vector<WmsLayer>& layers, const ServiceOpti
 
 /// CRSs that all the layers have, as the first one writes them.
 std::vector<std::string> common_crs(const std::vector<WmsLayer>& layers) {
+  std::vector<std::unordered_set<std::string>> others;
+  for (auto layer = layers.begin() + 1; layer != layers.end(); ++layer) {
+    auto& names = others.emplace_back();
+    for (const std::string& written : layer->crs) names.insert(crs_name(written));
+  }
   std::vector<std::string> common;
   for (const std::string& written : layers.front().crs) {
-    const bool everywhere = std::all_of(layers.begin() + 1, layers.end(), [&](const WmsLayer& layer) {
-      return std::any_of(layer.crs.begin(), layer.crs.end(), [&](const std::string& other) { return crs_name(other) == crs_name(written); });
-    });
-    if (everywhere) common.push_back(written);
+    const std::string name = crs_name(written);
+    if (std::all_of(others.begin(), others.end(), [&](const auto& names) { return names.contains(name); })) common.push_back(written);
   }
   return common;
 }
@@ -98,7 +102,7 @@ bool suits(const std::string& name, const CrsAxes& axes, const geo::Ellipsoid& w
 
 /// Fills in crs and axes: the one that is wanted, else Web Mercator, longitude and latitude, or the first that PROJ knows.
 Result<void> choose_crs(const ServiceOptions& options, const geo::Ellipsoid& world, Choice& choice) {
-  std::vector<std::string> there = common_crs(choice.layers);
+  const std::vector<std::string> there = common_crs(choice.layers);
   const auto try_one = [&](const std::string& written) -> Result<void> {
     const Result<CrsAxes> axes = axes_of(crs_name(written));
     if (!axes) return axes.error();
@@ -119,9 +123,11 @@ Result<void> choose_crs(const ServiceOptions& options, const geo::Ellipsoid& wor
     if (on_earth) return name == "EPSG:3857" ? 0 : name == "OGC:CRS84" ? 1 : name == "EPSG:4326" ? 2 : 3;
     return name == "OGC:CRS84" || name == "EPSG:4326" ? 4 : 3;  // a body's own before the Earth's degrees
   };
-  std::stable_sort(there.begin(), there.end(), [&](const std::string& a, const std::string& b) { return rank(a) < rank(b); });
-  for (std::size_t i = 0; i < std::min(there.size(), kMostTried); ++i) {
-    if (try_one(there[i])) return {};
+  std::vector<std::pair<int, std::string>> ranked;
+  for (const std::string& written : there) ranked.emplace_back(rank(written), written);
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (std::size_t i = 0; i < std::min(ranked.size(), kMostTried); ++i) {
+    if (try_one(ranked[i].second)) return {};
   }
   return Error{ErrorCode::unsupported, fmt::format("its layers are in no CRS that PROJ knows on this body; they are in {}", listed(there))};
 }
@@ -205,7 +211,7 @@ Result<TileGrid> virtual_grid(const WmsCapabilities& service, const ServiceOptio
   if (!grid) return grid.error();
   // Not beyond the scales at which the layers are drawn, unless the user says so.
   auto& levels = grid->levels;
-  while (!options.most_level && levels.size() > 1 && levels[levels.size() - 2].pixel.x <= finest) levels.pop_back();
+  while (!options.most_level && levels.size() > 1 && levels.back().pixel.x < finest * (1 - 1e-6)) levels.pop_back();
   while (!options.least_level && grid->min_zoom + 1 < static_cast<int>(levels.size()) && levels[static_cast<std::size_t>(grid->min_zoom)].pixel.x > coarsest) ++grid->min_zoom;
   return grid;
 }
@@ -282,7 +288,9 @@ Result<std::unique_ptr<RasterSource>> open_wms(const ServiceOptions& options, co
   pyramid.attribution = choice->layers.front().attribution.empty() ? service->title : choice->layers.front().attribution;
   const bool north_first = choice->version_1_3 && choice->axes.north_first;
   const UrlOfTile url_of = [request, grid_of = pyramid.grid, north_first](const TileAddress& tile) { return request + "&BBOX=" + box_text(grid_of, tile, north_first); };
-  pyramid.supply = service_tiles(url_of, options.headers, pyramid.name, std::move(store));
+  const Parameters dimensions(options.dimensions.begin(), options.dimensions.end());
+  pyramid.revision = pyramid.name + mark_of(dimensions);
+  pyramid.supply = service_tiles(url_of, options, dimensions, std::move(store));
   const std::optional<Box> bounds = union_of(choice->layers, [](const WmsLayer& l) { return l.bounds; });
   return open_service(std::move(pyramid), options, bounds, world);
 }

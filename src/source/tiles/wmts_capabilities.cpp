@@ -68,7 +68,6 @@ std::optional<std::array<double, 4>> read_bounds(const pugi::xml_node& box) {
 WmtsLayer read_layer(const pugi::xml_node& node) {
   WmtsLayer layer;
   layer.identifier = child_text(node, "Identifier");
-  layer.title = child_text(node, "Title");
   layer.bounds = read_bounds(child(node, "WGS84BoundingBox"));
   for (const pugi::xml_node& style : children(node, "Style")) {
     const std::string is_default = attribute(style, "isDefault");

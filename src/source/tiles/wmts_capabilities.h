@@ -57,7 +57,6 @@ struct WmtsLayer {
     std::string pattern;       ///< a URL with {TileMatrix} and the like
   };
   std::string identifier;
-  std::string title;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees
   std::vector<Style> styles;
   std::vector<std::string> formats;

@@ -2,6 +2,8 @@
 #include <cctype>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,6 +19,8 @@
 
 namespace tellurion::source {
 namespace {
+
+constexpr std::size_t kMostTried = 200;  ///< matrix sets
 
 std::string lower(std::string_view text) {
   std::string out(text);
@@ -69,19 +73,28 @@ int rank_of(const TileMatrixSet& set) {
 
 /// Fills in set, link and axes: the set that is wanted, or the best whose CRS can be used.
 Result<void> choose_matrix_set(const WmtsCapabilities& service, const ServiceOptions& options, const geo::Ellipsoid& world, Choice& choice) {
-  std::vector<std::pair<const TileMatrixSet*, const WmtsLayer::MatrixSetLink*>> sets;
+  struct Candidate {
+    int rank;
+    const TileMatrixSet* set;
+    const WmtsLayer::MatrixSetLink* link;
+  };
+  std::unordered_map<std::string_view, const TileMatrixSet*> by_name;
+  for (const TileMatrixSet& set : service.matrix_sets) by_name.emplace(set.identifier, &set);
+  std::vector<Candidate> sets;
   std::vector<std::string> names;
   for (const auto& link : choice.layer->links) {
-    const TileMatrixSet* set = service.find_matrix_set(link.set);
-    if (!set) continue;
-    names.push_back(fmt::format("{} ({})", set->identifier, crs_name(set->crs)));
-    if (options.matrix_set.empty() || options.matrix_set == set->identifier) sets.emplace_back(set, &link);
+    const auto found = by_name.find(link.set);
+    if (found == by_name.end()) continue;
+    const TileMatrixSet& set = *found->second;
+    names.push_back(fmt::format("{} ({})", set.identifier, crs_name(set.crs)));
+    if (options.matrix_set.empty() || options.matrix_set == set.identifier) sets.push_back({rank_of(set), &set, &link});
   }
   if (sets.empty() && !options.matrix_set.empty())
     return invalid(fmt::format("its layer {} has no tile matrix set \"{}\"; it has {}", choice.layer->identifier, options.matrix_set, listed(names)));
-  std::stable_sort(sets.begin(), sets.end(), [](const auto& a, const auto& b) { return rank_of(*a.first) < rank_of(*b.first); });
+  std::stable_sort(sets.begin(), sets.end(), [](const Candidate& a, const Candidate& b) { return a.rank < b.rank; });
+  sets.erase(sets.begin() + static_cast<std::ptrdiff_t>(std::min(sets.size(), kMostTried)), sets.end());
   std::string why = "none";
-  for (const auto& [set, link] : sets) {
+  for (const auto& [rank, set, link] : sets) {
     const std::string crs = crs_name(set->crs);
     if (crs == "EPSG:3857" && !is_earth(world)) continue;
     const Result<CrsAxes> axes = axes_of(crs);
@@ -122,7 +135,7 @@ Result<std::string> filled(const std::string& pattern, const Parameters& fields)
     const std::string name = pattern.substr(open + 1, close == std::string::npos ? close : close - open - 1);
     const auto field = std::find_if(fields.begin(), fields.end(), [&](const auto& f) { return lower(f.first) == lower(name); });
     if (close == std::string::npos || field == fields.end())
-      return Error{ErrorCode::unsupported, fmt::format("its template {} has a field {{{}}} that nothing is known for", fetch::public_part(pattern), name.substr(0, 60))};
+      return Error{ErrorCode::unsupported, fmt::format("its template {} has a field {{{}}} that nothing is known for", fetch::public_part(pattern), name.substr(0, std::min<std::size_t>(name.find_first_of("?&/{"), 60)))};
     url += pattern.substr(at, open - at) + escaped(field->second, true);
     at = close + 1;
   }
@@ -218,7 +231,7 @@ Result<std::unique_ptr<RasterSource>> open_wmts(const ServiceOptions& options, c
     if (!ranges[level].contains(tile)) return std::string();
     return make(matrices[level], tile.column, tile.row).value_or("");
   };
-  pyramid.supply = service_tiles(url_of, options.headers, pyramid.name, std::move(store));
+  pyramid.supply = service_tiles(url_of, options, choice->dimensions, std::move(store));
   return open_service(std::move(pyramid), options, choice->layer->bounds, world);
 }
 
