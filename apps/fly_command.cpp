@@ -86,7 +86,7 @@ void give_memory_back() {
 }
 
 int fly(const FlyOptions& options) {
-  keep_memory_flat();
+  if (!options.realtime) keep_memory_flat();
   auto flight = view::read_flight(options.flight);
   if (!flight) return report(flight.error());
   auto thread = gpu::RenderThread::headless(options.api);
@@ -133,7 +133,7 @@ int fly(const FlyOptions& options) {
       if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
     }
     show_progress(frame + 1, count);
-    give_memory_back();
+    if (!options.realtime) give_memory_back();
   }
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   summary.sources = (*globe)->source_stats();

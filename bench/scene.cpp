@@ -6,7 +6,7 @@ namespace tellurion::bench {
 namespace {
 
 constexpr std::size_t kGpuBytes = std::size_t{512} << 20;
-constexpr std::chrono::minutes kPatience{5};
+constexpr std::chrono::minutes kPatience{15};
 constexpr Degrees kVerticalFov{45.0};
 
 Result<void> add_layers(globe::World& world, const Setting& setting, std::initializer_list<DataLayer> layers) {
@@ -46,7 +46,7 @@ Result<std::unique_ptr<globe::Globe>> open_with_tables(globe::World world, const
   auto globe = globe::Globe::open(std::move(world), options);
   if (!globe) return globe.error();
   if (!(*globe)->wait_for_tables(std::chrono::steady_clock::now() + kPatience))
-    return Error{ErrorCode::unavailable, "the error tables are not ready after five minutes"};
+    return Error{ErrorCode::unavailable, "the error tables are not ready after a quarter of an hour"};
   return globe;
 }
 
@@ -66,7 +66,7 @@ Result<Scene> open_scene(globe::World world, const Setting& setting) {
 
 Result<void> finish(Scene& scene, const view::Camera& camera, const globe::ViewSettings& settings) {
   if (scene.view->finish(camera, settings, std::chrono::steady_clock::now() + kPatience)) return {};
-  return {ErrorCode::unavailable, fmt::format("the view of {} was not finished within five minutes",
+  return {ErrorCode::unavailable, fmt::format("the view of {} was not finished within a quarter of an hour",
                                               to_text(view::pose_of(scene.globe->ellipsoid(), camera)))};
 }
 

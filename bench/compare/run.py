@@ -134,7 +134,7 @@ def render(scenario, server, sse, picture, folder, options):
     """Stands still: one picture, then some frames of it."""
     stats = folder / "stats.json"
     complaints = run_tellurion(
-        [options.tellurion, "render", world_file(folder, server), "--camera", scenario.pose.text(), "--out", picture,
+        [options.tellurion, "render", world_file(folder, server), "--camera", scenario.pose.text(), "--out", picture or folder / "unwanted.png",
          "--stats", stats, "--timeout", options.timeout, *common_options(sse, folder)], options)
     figures = json.loads(stats.read_text())
     return {

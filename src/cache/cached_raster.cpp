@@ -193,8 +193,7 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
           block = std::move(decoded).value();
         } else if (decoded.error().code == ErrorCode::pending) {
           pending = true;  // the others are asked for too
-          const int width = std::min(kBlockSide, size.width - left), height = std::min(kBlockSide, size.height - top);
-          block = freeze(raster::Image{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4)});
+          block = freeze(raster::Image{std::min(kBlockSide, size.width - left), std::min(kBlockSide, size.height - top), {}});
         } else {
           return decoded.error();
         }
@@ -202,8 +201,10 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
       const int inner_x = x - column * kBlockSide;
       const bool beyond = !wraps && (window.x + i < 0 || window.x + i >= size.width);
       const int run = beyond ? 1 : std::min(block->width - inner_x, window.width - i);
-      std::memcpy(&image.rgba[image.offset(i, j)], &block->rgba[block->offset(inner_x, y - row * kBlockSide)],
-                  static_cast<std::size_t>(run) * 4);
+      if (!pending) {
+        std::memcpy(&image.rgba[image.offset(i, j)], &block->rgba[block->offset(inner_x, y - row * kBlockSide)],
+                    static_cast<std::size_t>(run) * 4);
+      }
       i += run;
     }
   }

@@ -34,10 +34,9 @@ SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<La
   std::ranges::stable_sort(order_, {}, [&](std::size_t i) { return layers_[i].spec.group; });
 }
 
-SurfaceSteps::Steps SurfaceSteps::steps_at(const std::optional<UtcTime>& time) const {
-  Steps steps;
+void SurfaceSteps::find_steps(const std::optional<UtcTime>& time, Steps& steps) const {
+  steps.clear();
   for (const OneLayer& layer : layers_) steps.push_back(layer.timed ? layer.timed->times.step_at(time) : 0);
-  return steps;
 }
 
 SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step) {
@@ -78,12 +77,14 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::held(const Step
 std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::held_at(const std::optional<UtcTime>& time) {
   std::lock_guard lock(mutex_);
   if (!has_times_ && !surfaces_.empty()) return surfaces_.front().second;
-  return held(steps_at(time));
+  find_steps(time, asked_steps_);
+  return held(asked_steps_);
 }
 
 std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::optional<UtcTime>& time) {
-  Steps steps = steps_at(time);
   if (auto same = held_at(time)) return same;
+  Steps steps;
+  find_steps(time, steps);
   std::vector<Source> sources;
   for (std::size_t i = 0; i < layers_.size(); ++i) sources.push_back(layers_[i].timed ? source_of(layers_[i], steps[i]) : layers_[i].fixed);
   std::lock_guard lock(mutex_);

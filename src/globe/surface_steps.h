@@ -66,7 +66,7 @@ class SurfaceSteps {
   };
   using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
 
-  Steps steps_at(const std::optional<UtcTime>& time) const;
+  void find_steps(const std::optional<UtcTime>& time, Steps& steps) const;
   /// Opens it if it is not open, without the lock.
   Source source_of(OneLayer& layer, std::int64_t step);
   std::shared_ptr<const surface::SurfaceDescription> held(const Steps& steps);
@@ -80,6 +80,7 @@ class SurfaceSteps {
   mutable std::mutex mutex_;        ///< guards what follows and what the timed layers have open; never held while a source is opened
   std::uint32_t next_id_ = 0;
   std::uint64_t last_revision_ = 0;
+  Steps asked_steps_;               ///< of the last question: frames ask, and must not allocate
   std::list<std::pair<Steps, std::shared_ptr<const surface::SurfaceDescription>>> surfaces_;  ///< the most recently used first
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -87,20 +88,24 @@ std::optional<WindowChoice> choose_window(const source::RasterDescription& raste
   }
 }
 
-/// Means of factor.x x factor.y pixels.
-raster::Image reduced(const raster::Image& image, glm::ivec2 factor) {
+/// Means of factor.x x factor.y pixels; both are powers of two.
+raster::Image reduced(raster::Image image, glm::ivec2 factor) {
   if (factor == glm::ivec2(1)) return image;
   raster::Image out{image.width / factor.x, image.height / factor.y, {}};
-  out.rgba.reserve(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height) * 4);
+  out.rgba.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height) * 4);
   const auto count = static_cast<unsigned>(factor.x * factor.y);
+  const int shift = std::countr_zero(count);
+  auto mean = out.rgba.begin();
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {
-      std::array<unsigned, 4> sum{};
+      std::array<unsigned, 4> sum{count / 2, count / 2, count / 2, count / 2};
       for (int row = 0; row < factor.y; ++row) {
-        const std::size_t start = image.offset(x * factor.x, y * factor.y + row);
-        for (std::size_t i = 0; i < static_cast<std::size_t>(factor.x) * 4; ++i) sum[i & 3] += image.rgba[start + i];
+        const std::uint8_t* pixel = &image.rgba[image.offset(x * factor.x, y * factor.y + row)];
+        for (int i = 0; i < factor.x; ++i, pixel += 4) {
+          for (std::size_t c = 0; c < 4; ++c) sum[c] += pixel[c];
+        }
       }
-      for (const unsigned channel : sum) out.rgba.push_back(static_cast<std::uint8_t>((channel + count / 2) / count));
+      for (const unsigned channel : sum) *mean++ = static_cast<std::uint8_t>(channel >> shift);
     }
   }
   return out;
@@ -149,7 +154,7 @@ Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dve
   Result<raster::Image> image = raster.read_colours(choice->level, choice->window);
   if (!image) return image.error();
   clear_outside(*image, choice->window, about.levels[static_cast<std::size_t>(choice->level)], about.wraps, closed);
-  window.image = reduced(*image, choice->reduction);
+  window.image = reduced(std::move(*image), choice->reduction);
   const glm::dvec2 scale = source::level_scale(about, choice->level);
   window.first = glm::dvec2(choice->window.x, choice->window.y) / scale;
   window.scale = scale / glm::dvec2(choice->reduction);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <algorithm>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gdal_priv.h>
@@ -127,14 +128,15 @@ Result<raster::Image> pixels_of(GDALDataset& d) {
   raster::Image image{d.GetRasterXSize(), d.GetRasterYSize(), {}};
   const std::size_t count = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   image.rgba.assign(count * 4, 255);
-  const auto read = [&](int band, int channel) {
-    return d.GetRasterBand(band)->RasterIO(GF_Read, 0, 0, image.width, image.height, image.rgba.data() + channel, image.width, image.height,
-                                           GDT_Byte, 4, 4 * image.width, nullptr) == CE_None;
+  // All channels at once: drivers then decode into the image, not through GDAL's cache of blocks.
+  const auto read = [&](std::vector<int> of_channels) {
+    return d.RasterIO(GF_Read, 0, 0, image.width, image.height, image.rgba.data(), image.width, image.height, GDT_Byte,
+                      static_cast<int>(of_channels.size()), of_channels.data(), 4, 4 * image.width, 1, nullptr) == CE_None;
   };
   const int bands = d.GetRasterCount();
   bool good = true;
   if (const GDALColorTable* table = d.GetRasterBand(1)->GetColorTable(); table != nullptr && bands == 1) {
-    good = read(1, 0);
+    good = read({1});
     for (std::size_t i = 0; i < count; ++i) {
       GDALColorEntry entry{0, 0, 0, 0};
       table->GetColorEntryAsRGB(image.rgba[4 * i], &entry);
@@ -143,9 +145,10 @@ Result<raster::Image> pixels_of(GDALDataset& d) {
       image.rgba[4 * i + 2] = static_cast<std::uint8_t>(entry.c3);
       image.rgba[4 * i + 3] = static_cast<std::uint8_t>(entry.c4);
     }
+  } else if (bands < 3) {
+    good = read(bands == 1 ? std::vector{1, 1, 1} : std::vector{1, 1, 1, 2});
   } else {
-    for (int channel = 0; channel < 3; ++channel) good = good && read(bands >= 3 ? channel + 1 : 1, channel);
-    if (bands == 2 || bands == 4) good = good && read(bands, 3);
+    good = read(bands == 4 ? std::vector{1, 2, 3, 4} : std::vector{1, 2, 3});
   }
   if (!good) return Error{ErrorCode::corrupt, quiet.last()};
   return image;
