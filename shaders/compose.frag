@@ -19,5 +19,10 @@ void main() {
   vec3 plain = colour.rgb / max(colour.a, 1.0 / 255.0);
   colour.rgb = clamp(pow(plain, vec3(u_adjust.y)) * u_adjust.z, 0.0, 1.0) * colour.a;
 #endif
+#ifdef MASK
+  if (colour.a < 0.5) discard;
+  o_colour = vec4(colour.r / colour.a);
+#else
   o_colour = colour * u_adjust.x;
+#endif
 }

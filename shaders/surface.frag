@@ -8,6 +8,7 @@ layout(location = 0) out vec4 o_colour;
 uniform sampler2DArray u_colour;
 uniform sampler2DArray u_slope;
 uniform sampler2DArray u_before;
+uniform sampler2DArray u_effects;
 uniform vec4 u_tile[8];
 
 in vec4 v_uv;
@@ -24,6 +25,9 @@ in vec2 v_st;
 in vec4 v_sun;
 in vec4 v_sunlight;
 in vec4 v_ambient;
+#ifdef EFFECTS
+in vec4 v_eye;
+#endif
 #elif defined(ATMOSPHERE)
 in vec3 v_air_light;
 in vec3 v_air_through;
@@ -63,6 +67,16 @@ void main() {
   vec2 slope = sun.w * texture(u_slope, vec3(v_uv.zw, u_tile[5].w)).rg;
   float facing = (v_sun.z - dot(slope, v_sun.xy)) * inversesqrt(1.0 + dot(slope, slope));
   colour *= v_ambient.rgb + v_sunlight.rgb * max(facing, 0.0);
+#ifdef EFFECTS
+  vec4 effects = texture(u_effects, vec3(v_uv.xy, u_tile[7].w));
+  colour += v_eye.w * effects.rgb * effects.rgb;
+  // The sun's mirror image in water under a moderate wind, spread by its waves: Blinn's lobe as wide as their slopes
+  // (variance 0.02), weakened by Schlick's approximation of Fresnel's share for water.
+  vec3 to_eye = normalize(v_eye.xyz);
+  vec3 half_way = normalize(normalize(v_sun.xyz) + to_eye);
+  float mirrored = 0.02 + 0.98 * pow(1.0 - clamp(dot(half_way, to_eye), 0.0, 1.0), 5.0);
+  colour += effects.a * mirrored * 12.5 * pow(max(half_way.z, 0.0), 100.0) * v_sunlight.rgb * max(v_sun.z, 0.0);
+#endif
   colour += vec3(v_sun.w, v_sunlight.w, v_ambient.w);
 #else
   colour = colour * v_air_through + v_air_light;

@@ -8,7 +8,7 @@ layout(location = 4) in float a_skirt;
 // 0: origin - eye, upper part; reference height   1: origin - eye, lower part; morph
 // 2: normal at the origin; skirt depth            3: tangent of the slope map; level
 // 4: colour slot's scale, offset, layer           5: slope slot's likewise
-// 6: the slot that it fades from, likewise        7: fade; sink depth, sink level
+// 6: the slot that it fades from, likewise        7: fade; sink depth, sink level; layer of the effects
 uniform vec4 u_tile[8];
 
 // Few and full: a software rasteriser pays for every one of a triangle.
@@ -27,6 +27,9 @@ out vec2 v_st;
 out vec4 v_sun;           // direction to the sun along the slope map's tangents and up
 out vec4 v_sunlight;
 out vec4 v_ambient;
+#ifdef EFFECTS
+out vec4 v_eye;           // direction to the eye likewise; share of the night's own light
+#endif
 #elif defined(ATMOSPHERE)
 out vec3 v_air_light;
 out vec3 v_air_through;
@@ -95,6 +98,10 @@ void main() {
   v_sun = vec4(to_sun, air_light.r);
   v_sunlight = vec4(sunlight * air_through, air_light.g);
   v_ambient = vec4(ambient * air_through, air_light.b);
+#ifdef EFFECTS
+  float night = 1.0 - smoothstep(-0.2, 0.02, to_sun.z);
+  v_eye = vec4(-dot(relative, tangent_u), -dot(relative, tangent_v), -dot(relative, up), night * air_through.g);
+#endif
 #elif defined(ATMOSPHERE)
   v_air_light = air_light;
   v_air_through = air_through;

@@ -37,12 +37,12 @@ int default_worker_count() {
 }
 
 bool is_drawn(LayerGroup group) {
-  return group == LayerGroup::height || group == LayerGroup::color || group == LayerGroup::grayscale;
+  return group != LayerGroup::grayscale_overlay && group != LayerGroup::overlay;
 }
 
 source::SampleKind kind_of(LayerGroup group) {
   if (group == LayerGroup::height) return source::SampleKind::height;
-  return group == LayerGroup::grayscale ? source::SampleKind::grey : source::SampleKind::colour;
+  return group == LayerGroup::grayscale || group == LayerGroup::water ? source::SampleKind::grey : source::SampleKind::colour;
 }
 
 }  // namespace

@@ -103,6 +103,8 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
     layer.gamma = static_cast<float>(one.spec.gamma);
     layer.multiplier = static_cast<float>(one.spec.multiplier);
     layer.adds = one.spec.adds;
+    if (one.spec.group == LayerGroup::night) layer.use = surface::ImageUse::night;
+    if (one.spec.group == LayerGroup::water) layer.use = surface::ImageUse::water;
     (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
   }
   surfaces_.emplace_front(std::move(steps), description);

@@ -13,7 +13,7 @@ namespace {
 
 using surface::ImagePatch;
 
-constexpr std::uint32_t kAdjust = 1;  // feature bit
+constexpr std::uint32_t kAdjust = 1, kMask = 2;  // feature bits
 constexpr std::size_t kMaxScratch = 8;
 enum Uniform { u_slot_range, u_cells, u_image_texels, u_adjust };
 
@@ -37,11 +37,11 @@ int size_class(int size) { return static_cast<int>(std::bit_ceil(static_cast<uns
 Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
   gpu::ProgramFamily programs({shader_texts({"compose.vert"}),
                                shader_texts({"compose.frag"}),
-                               {"ADJUST"},
+                               {"ADJUST", "MASK"},
                                {"u_slot_range", "u_cells", "u_image_texels", "u_adjust"},
                                {"u_image"},
                                {}});
-  for (const std::uint32_t features : {0u, kAdjust}) {
+  for (const std::uint32_t features : {0u, kAdjust, kMask, kAdjust | kMask}) {
     const auto program = programs.variant(thread, features);
     if (!program) return program.error();
   }
@@ -69,8 +69,7 @@ Compositor::Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs, g
   glBindVertexArray(0);
 }
 
-Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const ImagePatch> patches, const SlotPool& pool,
-                                 Slot slot, Budget& budget) {
+void Compositor::begin(const SlotPool& pool, Slot slot) {
   glBindFramebuffer(GL_FRAMEBUFFER, target_.name());
   glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, pool.texture(slot), 0, static_cast<GLint>(slot.layer));
   glViewport(0, 0, pool.format().side, pool.format().side);
@@ -78,7 +77,11 @@ Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const Imag
   glDisable(GL_CULL_FACE);
   glDisable(GL_SCISSOR_TEST);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
 
+Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const ImagePatch> patches, const SlotPool& pool,
+                                 Slot slot, Budget& budget) {
+  begin(pool, slot);
   const auto top = std::find_if(patches.rbegin(), patches.rend(), hides_all);
   const auto first = top == patches.rend() ? patches.begin() : std::prev(top.base());
   if (top == patches.rend()) {
@@ -92,10 +95,26 @@ Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const Imag
   return make_levels(thread, pool, slot);
 }
 
+Result<void> Compositor::compose_effects(gpu::RenderThread& thread, std::span<const ImagePatch> patches, const SlotPool& pool,
+                                         Slot slot, Budget& budget) {
+  begin(pool, slot);
+  glClearColor(0, 0, 0, 0);
+  glClear(GL_COLOR_BUFFER_BIT);
+  for (const ImagePatch& patch : patches) {
+    const GLboolean is_water = patch.use == surface::ImageUse::water;
+    glColorMask(!is_water, !is_water, !is_water, is_water);
+    if (auto drawn = draw(thread, patch, budget); !drawn) return drawn;
+  }
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glDisable(GL_BLEND);
+  return make_levels(thread, pool, slot);
+}
+
 Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch, Budget& budget) {
   assert(patch.columns > 0 && patch.rows > 0 && patch.image.width > 0 && patch.image.height > 0);
   const bool adjusts = patch.gamma != 1.0f || patch.multiplier != 1.0f;
-  const auto program = programs_.variant(thread, adjusts ? kAdjust : 0u);
+  const bool is_mask = patch.use == surface::ImageUse::water;
+  const auto program = programs_.variant(thread, (adjusts ? kAdjust : 0u) | (is_mask ? kMask : 0u));
   if (!program) return program.error();
 
   const Scratch& scratch = scratch_for(thread, patch.image, budget);
@@ -115,7 +134,12 @@ Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch
   glUniform4f(locations[u_image_texels], static_cast<float>(patch.image.width), static_cast<float>(patch.image.height),
               static_cast<float>(scratch.width), static_cast<float>(scratch.height));
   glUniform3f(locations[u_adjust], patch.opacity, patch.gamma, patch.multiplier);
-  if (patch.opaque && patch.opacity >= 1.0f) {
+  if (is_mask) {  // drawn where the image is, by the opacity of the layer
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendColor(0, 0, 0, patch.opacity);
+    glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
+  } else if (patch.opaque && patch.opacity >= 1.0f) {
     glDisable(GL_BLEND);
   } else {
     glEnable(GL_BLEND);

@@ -21,6 +21,10 @@ class Compositor {
   /// texture can hold and (columns + 1) * (rows + 1) points (asserted).
   Result<void> compose(gpu::RenderThread& thread, std::span<const surface::ImagePatch> patches, const SlotPool& pool,
                        Slot slot, Budget& budget);
+  /// The same with patches of night and water: the light of the night becomes the slot's red, green and blue, the share of water its
+  /// alpha, neither of them weighted by the other.
+  Result<void> compose_effects(gpu::RenderThread& thread, std::span<const surface::ImagePatch> patches, const SlotPool& pool,
+                               Slot slot, Budget& budget);
 
  private:
   /// A texture that patches' images are put into one after the other, at its lower corner.
@@ -36,6 +40,7 @@ class Compositor {
   Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs, gpu::ProgramFamily reduce_programs);
   Scratch& scratch_for(gpu::RenderThread& thread, const raster::Image& image, Budget& budget);
   void upload_cells(const surface::ImagePatch& patch);
+  void begin(const SlotPool& pool, Slot slot);
   Result<void> draw(gpu::RenderThread& thread, const surface::ImagePatch& patch, Budget& budget);
   Result<void> make_levels(gpu::RenderThread& thread, const SlotPool& pool, Slot slot);
 

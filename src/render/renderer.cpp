@@ -50,6 +50,19 @@ surface::TileGeometry triangle_before(const view::Camera& camera) {
   return geometry;
 }
 
+/// Imagery with effects, of one texel.
+surface::TileImagery imagery_of_a_texel() {
+  surface::ImagePatch patch;
+  patch.image = {1, 1, {255, 255, 255, 255}};
+  patch.columns = patch.rows = 1;
+  patch.image_points = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
+  surface::TileImagery imagery;
+  imagery.patches = {patch};
+  patch.use = surface::ImageUse::night;
+  imagery.effects = {std::move(patch)};
+  return imagery;
+}
+
 }  // namespace
 
 struct Renderer::State {
@@ -92,8 +105,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(gpu::RenderThread& thread, co
   if (!sky) return sky.error();
   auto state = std::make_unique<State>(thread, options, std::move(*compositor), std::move(*sky));
   const std::uint32_t features = features_of({}, options.air.has_value(), thread.capabilities().clip_control);
-  for (const std::uint32_t fading : {0u, static_cast<std::uint32_t>(SurfacePass::fade)}) {
-    if (auto prepared = state->surface.prepare(thread, features | fading); !prepared) return prepared.error();
+  constexpr std::uint32_t kFade = SurfacePass::fade, kEffects = SurfacePass::effects;
+  for (const std::uint32_t more : {0u, kFade, kEffects, kFade | kEffects}) {
+    if (auto prepared = state->surface.prepare(thread, features | more); !prepared) return prepared.error();
   }
   if (auto warmed = state->store.warm_up(thread); !warmed) return warmed.error();
   std::unique_ptr<Renderer> renderer(new Renderer(std::move(state)));
@@ -178,10 +192,10 @@ FrameFigures Renderer::State::draw_passes(gpu::RenderThread& thread, const view:
   const bool air = options.air.has_value();
   const std::uint32_t features = features_of(look, air, thread.capabilities().clip_control);
   surface.set_anisotropy(thread, look.anisotropy);
-  FrameFigures figures = surface.draw(thread, camera, look.exaggeration, features, tiles, store);
+  FrameFigures figures = surface.draw(thread, camera, look.exaggeration, look.to_sun.xyz, features, tiles, store);
   if (look.wireframe) {
     const std::uint32_t depth = features & SurfacePass::log_depth;
-    figures.draws += surface.draw(thread, camera, look.exaggeration, SurfacePass::wireframe | depth, tiles, store).draws;
+    figures.draws += surface.draw(thread, camera, look.exaggeration, look.to_sun.xyz, SurfacePass::wireframe | depth, tiles, store).draws;
   }
   if (look.bounds) surface.draw_boxes(thread, camera, look.exaggeration, features, tiles, store);
   if (look.atmosphere && air) {
@@ -221,16 +235,23 @@ bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   camera.width = camera.height = 16;
   camera.eye = {{2.0 * s.options.ellipsoid.a(), 0.0, 0.0}};
   if (!s.store.upload_geometry(thread, key, triangle_before(camera))) return true;
-  DrawTile tile{.key = key, .colour_owner = key, .colour_before = key, .slope_owner = key};
-  DrawTile fading = tile;
-  fading.colour_before.face = 0;
-  fading.fade = 0.5f;
-  const DrawTile tiles[] = {tile, fading};
+  const bool has_effects = s.store.upload_colour(thread, key, imagery_of_a_texel()).has_value();
+  geo::TileKey without = key;  // a tile that is not there
+  ++without.face;
+  std::vector<DrawTile> tiles;
+  for (const geo::TileKey& owner : {without, key}) {
+    DrawTile tile{.key = key, .colour_owner = owner, .colour_before = owner, .slope_owner = key};
+    tiles.push_back(tile);
+    tile.colour_before.face = 0;
+    tile.fade = 0.5f;
+    tiles.push_back(tile);
+  }
   Target target(GL_RGBA8, look.antialiasing ? std::min(kSamples, thread.capabilities().max_samples) : 1);
   s.draw_passes(thread, camera, look, tiles, target);
   glFinish();
   target.release(s.store.budget());
   s.store.release(key, surface::Part::geometry);
+  if (has_effects) s.store.release(key, surface::Part::colour);
   return true;
 }
 
@@ -282,7 +303,7 @@ GeoPicture Renderer::measure(gpu::RenderThread& thread, const view::Camera& came
   const GLuint sky[4] = {};
   glClearBufferuiv(GL_COLOR, 0, sky);
   const std::uint32_t depth = thread.capabilities().clip_control ? 0u : SurfacePass::log_depth;
-  s.surface.draw(thread, camera, look.exaggeration, SurfacePass::measure | depth, tiles, s.store);
+  s.surface.draw(thread, camera, look.exaggeration, look.to_sun.xyz, SurfacePass::measure | depth, tiles, s.store);
   s.end(thread);
 
   // OpenGL ES promises only this format for unsigned integers.

@@ -61,6 +61,14 @@ glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int si
           edge + inner * part * static_cast<double>(tile.y - first_y), layer};
 }
 
+/// Whether of a tile's effects some may be seen under a sun at this height over its middle (sine): lights where it is dark
+/// somewhere, water where it is not (see shaders/surface.vert).
+bool shows_effects(const ResidentTile& tile, int level, double sun_height) {
+  constexpr double kNightBegins = 0.02, kDayBegins = -0.03;
+  const double reach = std::ldexp(1.2, -level);  // more than from its middle to a corner, radians
+  return tile.effects && ((tile.has_night && sun_height < kNightBegins + reach) || (tile.has_water && sun_height > kDayBegins - reach));
+}
+
 struct TileUniforms {
   glm::vec4 v[kTileVectors];
 };
@@ -68,9 +76,9 @@ struct TileUniforms {
 gpu::ProgramSource surface_source() {
   return {shader_texts({"frame.glsl", "atmosphere.glsl", "surface.vert"}),
           shader_texts({"frame.glsl", "surface.frag"}),
-          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH"},
+          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH", "EFFECTS"},
           {"u_tile"},
-          {"u_colour", "u_slope", "u_before"},
+          {"u_colour", "u_slope", "u_before", "u_effects"},
           {"Frame"}};
 }
 
@@ -121,14 +129,20 @@ void SurfacePass::bind(unsigned unit, unsigned texture) {
 }
 
 FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration,
-                               std::uint32_t features, std::span<const DrawTile> tiles, const TileStore& store) {
-  const auto plain = programs_.variant(thread, features);
-  const auto fading = features & (measure | wireframe) ? plain : programs_.variant(thread, features | fade);
-  if (!plain || !fading) return {};
+                               const glm::dvec3& to_sun, std::uint32_t features, std::span<const DrawTile> tiles, const TileStore& store) {
+  // Of a tile at rest and of one that fades, each without and with effects; those matter to light only.
+  const bool coloured = !(features & (measure | wireframe)), shines = coloured && (features & light);
+  std::array<std::array<const gpu::LinkedProgram*, 2>, 2> programs{};
+  for (std::uint32_t fades = 0; fades < 2; ++fades) {
+    for (std::uint32_t with = 0; with < 2; ++with) {
+      const auto program = programs_.variant(thread, features | (coloured ? fades * fade : 0u) | (shines ? with * effects : 0u));
+      if (!program) return {};
+      programs[fades][with] = *program;
+    }
+  }
 
-  glBindSampler(0, colour_sampler_.name());
   glBindSampler(1, 0);
-  glBindSampler(2, colour_sampler_.name());
+  for (const unsigned unit : {0u, 2u, 3u}) glBindSampler(unit, colour_sampler_.name());
   std::fill(std::begin(bound_), std::end(bound_), 0u);
 
   FrameFigures figures;
@@ -142,7 +156,8 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     const auto colour_owner = tile.colour_owner == tile.key ? resident : store.find(tile.colour_owner);
     const bool fades = tile.fade < 1.0f && tile.colour_before != tile.colour_owner;
     const bool renews = !fades && colour_owner && colour_owner->colour_before;
-    const gpu::LinkedProgram* program = fades || renews ? *fading : *plain;
+    const bool has_effects = colour_owner && shows_effects(*colour_owner, tile.key.level, glm::dot(mesh.origin_up(), to_sun));
+    const gpu::LinkedProgram* program = programs[fades || renews ? 1 : 0][has_effects ? 1 : 0];
     if (program != in_use) {
       glUseProgram(program->program.name());
       in_use = program;
@@ -163,6 +178,11 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     u.v[5] = slot_place(tile.key, tile.slope_owner, surface::kSlopeSlotSide, surface::kSlopeGutter, slopes.layer);
     u.v[6] = u.v[4];
     u.v[7] = glm::vec4(renews ? colour_owner->renewal : tile.fade, tile.sink_depth, tile.sink_level, 0);
+    if (has_effects) {
+      const auto layer = store.effects_of(*colour_owner);
+      u.v[7].w = layer.layer;
+      bind(3, layer.texture);
+    }
     bind(0, colour.texture);
     bind(1, slopes.texture);
     if (fades || renews) {
@@ -184,7 +204,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     ++figures.draws;
   }
   glBindVertexArray(0);
-  for (GLuint unit = 0; unit < 3; ++unit) glBindSampler(unit, 0);
+  for (GLuint unit = 0; unit < 4; ++unit) glBindSampler(unit, 0);
   return figures;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
 #include "base/result.h"
@@ -19,7 +20,7 @@ namespace tellurion::render {
 class SurfacePass {
  public:
   /// What a variant of the surface's program does; bits of its features.
-  enum Feature : std::uint32_t { light = 1, atmosphere = 2, fade = 4, borders = 8, wireframe = 16, measure = 32, log_depth = 64 };
+  enum Feature : std::uint32_t { light = 1, atmosphere = 2, fade = 4, borders = 8, wireframe = 16, measure = 32, log_depth = 64, effects = 128 };
 
   explicit SurfacePass(gpu::RenderThread& thread);
 
@@ -27,7 +28,8 @@ class SurfacePass {
   Result<void> prepare(gpu::RenderThread& thread, std::uint32_t features);
 
   /// The frame's block must be bound and depth be set up.
-  FrameFigures draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, std::uint32_t features,
+  /// `to_sun`: unit vector in Ecef axes, of use with `light` only.
+  FrameFigures draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, const glm::dvec3& to_sun, std::uint32_t features,
                     std::span<const surface::DrawTile> tiles, const TileStore& store);
   void draw_boxes(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, std::uint32_t features,
                   std::span<const surface::DrawTile> tiles, const TileStore& store);
@@ -44,7 +46,7 @@ class SurfacePass {
   gpu::Buffer box_edges_;
   gpu::Sampler colour_sampler_;
   float anisotropy_ = 1.0f;
-  unsigned bound_[3] = {};
+  unsigned bound_[4] = {};
 };
 
 }  // namespace tellurion::render

@@ -70,7 +70,9 @@ Result<void> TileStore::warm_up(gpu::RenderThread& thread) {
     patches[i].linear = i % 2 == 0;
     patches[i].upper = glm::vec2(0.5f);
   }
-  return compositor_.compose(thread, patches, pool, *slot, budget_);
+  if (auto composed = compositor_.compose(thread, patches, pool, *slot, budget_); !composed) return composed;
+  for (std::size_t i = 0; i < patches.size(); ++i) patches[i].use = i % 2 == 0 ? surface::ImageUse::night : surface::ImageUse::water;
+  return compositor_.compose_effects(thread, patches, pool, *slot, budget_);
 }
 
 bool TileStore::has_room(std::size_t bytes) {
@@ -118,10 +120,24 @@ void TileStore::upload_slopes(Slot slot, const surface::SlopeMap& map) {
   }
 }
 
+std::optional<Slot> TileStore::acquire_colour(gpu::RenderThread& thread) {
+  auto slot = colours_.acquire(thread, budget_);
+  if (!slot && slopes_.give_back(budget_)) slot = colours_.acquire(thread, budget_);
+  return slot;
+}
+
 Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::TileKey& key,
                                       const surface::TileImagery& imagery, bool fades) {
+  const Error full{ErrorCode::exhausted, "the GPU budget has no room for the colours of tile " + geo::to_string(key)};
+  const bool has_effects = !imagery.effects.empty();
   const auto known = tiles_.find(key);
   std::optional<Slot> slot = known == tiles_.end() ? std::nullopt : known->second.colour;
+  std::optional<Slot> effects = known == tiles_.end() ? std::nullopt : known->second.effects;
+  std::optional<Slot> fresh_effects;
+  if (has_effects && !effects) {
+    effects = fresh_effects = acquire_colour(thread);
+    if (!effects) return full;
+  }
   if (slot && fades && !known->second.colour_before) {
     if (const auto fresh = colours_.acquire(thread, budget_)) {
       known->second.colour_before = slot;
@@ -130,18 +146,26 @@ Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::Tile
       slot = fresh;
     }
   }
-  if (!slot) slot = colours_.acquire(thread, budget_);
-  if (!slot && slopes_.give_back(budget_)) slot = colours_.acquire(thread, budget_);
+  if (!slot) slot = acquire_colour(thread);
   if (!slot) {
-    return {ErrorCode::exhausted, "the GPU budget has no room for the colours of tile " + geo::to_string(key)};
+    if (fresh_effects) colours_.release(*fresh_effects);
+    return full;
   }
-  tiles_[key].colour = slot;
+  if (effects && !has_effects) {
+    colours_.release(*effects);
+    effects.reset();
+  }
+  ResidentTile& tile = tiles_[key];
+  tile.colour = slot;
+  tile.effects = effects;
+  const auto has = [&](surface::ImageUse use) { return std::ranges::find(imagery.effects, use, &surface::ImagePatch::use) != imagery.effects.end(); };
+  tile.has_night = has(surface::ImageUse::night);
+  tile.has_water = has(surface::ImageUse::water);
   bytes_uploaded_ += imagery.bytes();
-  if (auto composed = compositor_.compose(thread, imagery.patches, colours_, *slot, budget_); !composed) {
-    release(key, surface::Part::colour);
-    return composed;
-  }
-  return {};
+  auto composed = compositor_.compose(thread, imagery.patches, colours_, *slot, budget_);
+  if (composed && has_effects) composed = compositor_.compose_effects(thread, imagery.effects, colours_, *effects, budget_);
+  if (!composed) release(key, surface::Part::colour);
+  return composed;
 }
 
 void TileStore::advance_renewals(float share) {
@@ -166,7 +190,7 @@ void TileStore::release(const geo::TileKey& key, surface::Part part) {
     if (tile.slopes) slopes_.release(*tile.slopes);
     tile.slopes.reset();
   } else {
-    for (auto* slot : {&tile.colour, &tile.colour_before}) {
+    for (auto* slot : {&tile.colour, &tile.colour_before, &tile.effects}) {
       if (*slot) colours_.release(**slot);
       slot->reset();
     }

@@ -23,6 +23,9 @@ struct ResidentTile {
   std::optional<Slot> colour;
   std::optional<Slot> colour_before;  ///< what `colour` replaces, until it has faded in
   float renewal = 1.0f;               ///< share of `colour` over it
+  std::optional<Slot> effects;        ///< light by night (red, green, blue) and share of water (alpha), where `colour` is
+  bool has_night = false;             ///< the one of them is not dark all over
+  bool has_water = false;
 };
 
 class TileStore {
@@ -54,6 +57,8 @@ class TileStore {
   /// The slot of `tile`, or an empty one (transparent; flat) if it has none.
   Layer colour_of(const ResidentTile* tile) const;
   Layer colour_before_of(const ResidentTile& tile) const;
+  /// Of a tile that has such a slot.
+  Layer effects_of(const ResidentTile& tile) const { return {colours_.texture(*tile.effects), static_cast<float>(tile.effects->layer)}; }
   Layer slopes_of(const ResidentTile* tile) const;
 
   Budget& budget() { return budget_; }
@@ -64,6 +69,7 @@ class TileStore {
  private:
   /// Slot arrays that nothing uses give way.
   bool has_room(std::size_t bytes);
+  std::optional<Slot> acquire_colour(gpu::RenderThread& thread);
   void upload_slopes(Slot slot, const surface::SlopeMap& map);
 
   Budget budget_;

@@ -29,6 +29,7 @@ struct Layer {
   float gamma = 1.0f;
   float multiplier = 1.0f;
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
+  ImageUse use = ImageUse::colour;  ///< image layers: what they are drawn into
 };
 
 /// The coarsest level of a layer that fills its voids: 64 samples across.
@@ -38,7 +39,7 @@ inline constexpr int kCoarsestFill = 6;
 struct SurfaceDescription {
   geo::Ellipsoid ellipsoid;
   std::vector<Layer> heights;
-  std::vector<Layer> colours;
+  std::vector<Layer> colours;   ///< of every use; each covers those of its own use only
   std::uint64_t revision = 0;
 };
 

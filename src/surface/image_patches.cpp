@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <utility>
 
@@ -135,6 +135,23 @@ bool is_opaque(const raster::Image& image) {
     if (image.rgba[i] != 255) return false;
   }
   return true;
+}
+
+/// Whether nothing of it would be seen; compression leaves dark pixels a little above black.
+bool is_dark(const raster::Image& image) {
+  constexpr std::uint8_t kDark = 6;
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    if (std::max({image.rgba[i], image.rgba[i + 1], image.rgba[i + 2]}) > kDark) return false;
+  }
+  return true;
+}
+
+/// Leaves out the patches of a use all of which are dark.
+void drop_dark(std::vector<ImagePatch>& effects) {
+  for (const ImageUse use : {ImageUse::night, ImageUse::water}) {
+    const auto is_bright = [use](const ImagePatch& patch) { return patch.use == use && !is_dark(patch.image); };
+    if (std::ranges::none_of(effects, is_bright)) std::erase_if(effects, [use](const ImagePatch& patch) { return patch.use == use; });
+  }
 }
 
 /// Pixels of a window after reduction, with the way into them.
@@ -270,10 +287,12 @@ bool ColourModel::take_pending(source::Awaited& awaited) {
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
   std::vector<ImagePatch> from_the_top;
   std::vector<MissingLayer> missing;
+  std::array<bool, kImageUses> hidden{};  // what lies further down, of each use
   bool pending = false;
   for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
     const Layer& settings = *layer->settings;
-    if (!settings.source->coverage().touches(key)) continue;
+    bool& hidden_below = hidden[static_cast<std::size_t>(settings.use)];
+    if (hidden_below || !settings.source->coverage().touches(key)) continue;
     source::RasterReader& reader = layer->raster.reader();
     const SlotMapping mapping = map_slot(model.description().ellipsoid, key, layer->raster.description(), reader);
     const ClosedSides closed = closed_sides(layer->raster.description(), reader);
@@ -297,15 +316,17 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
       patch->opacity = settings.opacity;
       patch->gamma = settings.gamma;
       patch->multiplier = settings.multiplier;
+      patch->use = settings.use;
       patch->opaque = patch->opaque && settings.opacity >= 1.0f;
       hides_all_below = hides_all_below && patch->opaque;
       from_the_top.push_back(std::move(patch).value());
     }
-    if (hides_all_below) break;
+    hidden_below = hides_all_below;
   }
   if (pending) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
   TileImagery imagery;
-  imagery.patches.assign(std::make_move_iterator(from_the_top.rbegin()), std::make_move_iterator(from_the_top.rend()));
+  for (ImagePatch& patch : std::views::reverse(from_the_top)) (patch.use == ImageUse::colour ? imagery.patches : imagery.effects).push_back(std::move(patch));
+  drop_dark(imagery.effects);
   imagery.missing = std::move(missing);
   return imagery;
 }

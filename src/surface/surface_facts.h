@@ -16,6 +16,7 @@ struct TileFacts {
   bool assumed = false;               ///< heights and error above are what any terrain could have: built tiles know better,
                                       ///< of themselves and of their descendants (Outlook)
   bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
+  bool own_effects = false;           ///< and another one, for night and water
   bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels
 };

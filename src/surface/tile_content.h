@@ -110,6 +110,10 @@ struct TileGeometry {
   TileMetrics metrics;
 };
 
+/// What an image layer tells of the ground: its colour by day, the light that it gives by night, or where there is water.
+enum class ImageUse : std::uint8_t { colour, night, water };
+inline constexpr std::size_t kImageUses = 3;
+
 /// A piece of a source image to be drawn into a tile's colour slot, lowest layer first.
 /// The control points form a grid of (columns + 1) x (rows + 1) over the slot's tile coordinates from `lower` to `upper`.
 struct ImagePatch {
@@ -124,6 +128,7 @@ struct ImagePatch {
   float opacity = 1.0f;
   float gamma = 1.0f;
   float multiplier = 1.0f;
+  ImageUse use = ImageUse::colour;
 };
 
 /// A layer that could not be read: the tile is composed of the others.
@@ -133,11 +138,15 @@ struct MissingLayer {
 };
 
 struct TileImagery {
-  std::vector<ImagePatch> patches;
+  std::vector<ImagePatch> patches;   ///< of colour
+  /// Of night and water, for a slot of their own. None of a use of which the tile has nothing: neither light nor water.
+  std::vector<ImagePatch> effects;
   std::vector<MissingLayer> missing;
   std::size_t bytes() const {
     std::size_t sum = 0;
-    for (const ImagePatch& p : patches) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);
+    for (const auto* list : {&patches, &effects}) {
+      for (const ImagePatch& p : *list) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);
+    }
     return sum;
   }
 };

@@ -31,6 +31,7 @@ MARS = [("height", "mars/mola_4ppd.tif"), ("color", "mars/mars_color_4096x2048.j
 MOON = [("height", "moon/lola_ldem4_4ppd_scale0.5.tif"), ("color", "moon/moon_4k.jpg")]
 POLAR = [("height", ETOPO5), ("height", ARCTIC), ("color", BLUE_MARBLE)]
 OVERLAPPING = [*EARTH, ("color", "earth/regional/mosaic_cog1.tif"), ("color", "earth/regional/mosaic_cog2.tif")]
+LIGHTS = [*EARTH, ("night", "earth/imagery/night_lights_4096.jpg"), ("water", "earth/imagery/water_mask_1600.png")]
 CITY = [*EARTH, ("color", "earth/regional/boston-inset.tif")]
 
 # name: layers, camera, more options
@@ -49,6 +50,8 @@ VIEWS = {
     "two_overlapping_rasters": (OVERLAPPING, (46.0, -73.7, 420e3), ["--no-lighting"]),
     "utm_inset": (CITY, (42.0, -71.1, 60e3, 0.0, -55.0), []),
     "exaggeration": (EARTH, (22.0, 84.0, 600e3, 0.0, -25.0), ["--exaggeration", 20]),
+    "night": (LIGHTS, (35.0, 10.0, 6e6), ["--time", "2024-12-21T17:00:00Z"]),
+    "sun_in_the_sea": (LIGHTS, (5.0, -30.0, 1.2e7), ["--time", "2024-06-20T13:30:00Z"]),
     "wireframe": (MOUNTAINS, (46.70, -121.76, 6500, 0, -10), ["--wireframe"]),
     "rainier": (MOUNTAINS, (46.70, -121.76, 6500, 0, -10), []),
     "rainier_plain": (MOUNTAINS, (46.95, -121.95, 9000, 135, -30), ["--no-lighting", "--no-atmosphere", "--clear", "404040"]),

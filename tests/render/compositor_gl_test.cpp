@@ -32,15 +32,24 @@ struct Bench {
 
   std::vector<std::uint8_t> compose(const std::vector<ImagePatch>& patches, int level = 0) {
     REQUIRE(compositor->compose(*thread, patches, pool, slot, budget).has_value());
+    return texels(level);
+  }
+
+  std::vector<std::uint8_t> compose_effects(const std::vector<ImagePatch>& patches, int level = 0) {
+    REQUIRE(compositor->compose_effects(*thread, patches, pool, slot, budget).has_value());
+    return texels(level);
+  }
+
+  std::vector<std::uint8_t> texels(int level) {
     const gpu::Framebuffer reader(*thread);
     glBindFramebuffer(GL_FRAMEBUFFER, reader.name());
     glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, pool.texture(slot), level,
                               static_cast<GLint>(slot.layer));
     const int side = kSide >> level;
-    std::vector<std::uint8_t> texels(static_cast<std::size_t>(side * side * 4));
-    glReadPixels(0, 0, side, side, GL_RGBA, GL_UNSIGNED_BYTE, texels.data());
+    std::vector<std::uint8_t> read(static_cast<std::size_t>(side * side * 4));
+    glReadPixels(0, 0, side, side, GL_RGBA, GL_UNSIGNED_BYTE, read.data());
     CHECK(glGetError() == GL_NO_ERROR);
-    return texels;
+    return read;
   }
 
   std::unique_ptr<gpu::RenderThread> thread;
@@ -279,4 +288,26 @@ TEST_CASE("compose: textures for images are few, and counted") {
   }
   // Widths 64 to 2048 in a height of 64, at 4 bytes.
   CHECK(bench.budget.used - slots == std::size_t{64} * (64 + 128 + 256 + 512 + 1024 + 2048) * 4);
+}
+
+TEST_CASE("compose_effects: light by night in red, green and blue, water in alpha, and neither touches the other") {
+  for (const gpu::Api api : {gpu::Api::core, gpu::Api::es}) {
+    Bench bench(api);
+    bench.compose({plain_patch({10, 20, 30, 255}, true, kAllLower, kAllUpper)});  // a slot used again keeps nothing of this
+    auto city = plain_patch({200, 100, 50, 255}, true, kAllLower, kAllUpper), haze = plain_patch({64, 64, 64, 128}, false, kAllLower, kAllUpper);
+    city.use = haze.use = surface::ImageUse::night;
+    auto sea = plain_patch({255, 255, 255, 255}, true, kAllLower, {0.75f, 1.1f}), land = plain_patch({0, 0, 0, 255}, true, kAllLower, {0.25f, 1.1f}),
+         unknown = plain_patch({0, 0, 0, 0}, false, kAllLower, kAllUpper);
+    sea.use = land.use = unknown.use = surface::ImageUse::water;
+    land.opacity = 0.5f;
+    const auto texels = bench.compose_effects({city, sea, haze, land, unknown});
+    // 64 + c * (1 - 128/255), by hand; water: half of the sea, the sea, nothing
+    CHECK(near(texel(texels, 20, 100), {164, 114, 89, 128}, 1));
+    CHECK(near(texel(texels, 128, 100), {164, 114, 89, 255}, 1));
+    CHECK(near(texel(texels, 230, 100), {164, 114, 89, 0}, 1));
+    sea.gamma = 2.0f;
+    sea.image.rgba = {128, 128, 128, 255};
+    CHECK(near(texel(bench.compose_effects({sea}), 128, 100), {0, 0, 0, 64}, 1));
+    CHECK(near(texel(bench.compose_effects({sea}), 230, 100), {0, 0, 0, 0}, 0));
+  }
 }

@@ -180,6 +180,37 @@ TEST_CASE("picture: slopes that face the sun are lighter, and the night is dim b
   CHECK(std::abs(tilted({0.0f, 0.3f}) - tilted({0.0f, -0.3f})) <= 3);
 }
 
+TEST_CASE("picture: lights of the night show in the dark only, water mirrors the sun and nothing else") {
+  const geo::TileKey key{0, 6, 32, 32};
+  const auto shown = [&](std::array<std::uint8_t, 4> night, std::array<std::uint8_t, 4> water, double sun_from_zenith, bool lighting = true) {
+    Stage stage(gpu::Api::core, "", {.ellipsoid = geo::kWgs84, .air = std::nullopt});
+    REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, exact_geometry(geo::kWgs84, key, flat)).has_value());
+    auto imagery = exact_imagery(key, [](const auto&) { return glm::dvec3(0.2); });
+    for (const auto& [use, texel] : {std::pair(surface::ImageUse::night, night), std::pair(surface::ImageUse::water, water)}) {
+      auto& patch = imagery.effects.emplace_back(imagery.patches.front());
+      patch.image = {1, 1, {texel.begin(), texel.end()}};
+      patch.use = use;
+    }
+    REQUIRE(stage.renderer->upload_colour(*stage.thread, key, imagery).has_value());
+    const DrawTile tile = draw_alone(key);
+    FrameLook look;
+    look.lighting = lighting;
+    look.to_sun = geo::enu_at(geo::kWgs84, {})(geo::Vector<geo::Enu>{glm::dvec3(std::sin(sun_from_zenith), 0.0, std::cos(sun_from_zenith))});
+    return pixel(stage.picture(camera_at("-0.5,0.5,50000"), look, {&tile, 1}), kWidth / 2, kHeight / 2);
+  };
+  constexpr std::array<std::uint8_t, 4> kDark{0, 0, 0, 255}, kLamp{255, 128, 0, 255}, kSea{255, 255, 255, 255};
+  constexpr double kNoon = 0.0, kMorning = 1.0, kMidnight = 3.0;
+  CHECK(shown(kLamp, kDark, kMorning) == shown(kDark, kDark, kMorning));
+  const auto lit = shown(kLamp, kDark, kMidnight), dark = shown(kDark, kDark, kMidnight);
+  CHECK(lit[0] > 200);
+  CHECK(lit[1] > dark[1] + 60);
+  CHECK(lit[2] == dark[2]);
+  CHECK(shown(kDark, kSea, kNoon)[0] > shown(kDark, kDark, kNoon)[0] + 40);
+  CHECK(shown(kDark, kSea, kMorning) == shown(kDark, kDark, kMorning));
+  CHECK(shown(kDark, kSea, kMidnight) == shown(kDark, kDark, kMidnight));
+  CHECK(shown(kLamp, kSea, kMidnight, false) == shown(kDark, kDark, kMidnight, false));
+}
+
 TEST_CASE("measure: heights, places and distances agree with the analytic ellipsoid") {
   struct View {
     const char* pose;

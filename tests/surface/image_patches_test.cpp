@@ -304,6 +304,20 @@ TEST_CASE("build_imagery: layers keep their order and settings; one that hides a
   CHECK(Pictures({below, middle, top}).of(key).patches.size() == 2);
 }
 
+TEST_CASE("build_imagery: layers of night and water are effects, and hide only those of their own use") {
+  MadeRaster white = normals_picture(512);
+  Layer ground = layer_of(white, 1), night = layer_of(white, 2), water = layer_of(white, 3), more_night = layer_of(white, 4);
+  night.use = more_night.use = ImageUse::night;
+  water.use = ImageUse::water;
+  const TileImagery imagery = Pictures({ground, night, water, more_night}).of({0, 2, 1, 1});
+  REQUIRE(imagery.patches.size() == 1);
+  CHECK(imagery.patches[0].use == ImageUse::colour);
+  REQUIRE(imagery.effects.size() == 2);
+  CHECK(imagery.effects[0].use == ImageUse::water);
+  CHECK(imagery.effects[1].use == ImageUse::night);
+  CHECK(imagery.bytes() > 2 * imagery.patches[0].image.bytes());
+}
+
 TEST_CASE("build_imagery: a layer that cannot be read is named, and the others are there, those below it too") {
   MadeRaster white = normals_picture(512), broken = normals_picture(512);
   broken.broken = true;
