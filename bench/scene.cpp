@@ -5,7 +5,6 @@
 namespace tellurion::bench {
 namespace {
 
-constexpr std::size_t kGpuBytes = std::size_t{512} << 20;
 constexpr std::chrono::minutes kPatience{15};
 constexpr Degrees kVerticalFov{45.0};
 
@@ -50,7 +49,7 @@ Result<std::unique_ptr<globe::Globe>> open_with_tables(globe::World world, const
   return globe;
 }
 
-Result<Scene> open_scene(globe::World world, const Setting& setting) {
+Result<Scene> open_scene(globe::World world, const Setting& setting, std::size_t gpu_bytes) {
   Scene scene;
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   if (!thread) return thread.error();
@@ -58,7 +57,7 @@ Result<Scene> open_scene(globe::World world, const Setting& setting) {
   auto globe = open_with_tables(std::move(world), setting);
   if (!globe) return globe.error();
   scene.globe = std::move(*globe);
-  auto view = globe::GlobeView::create(*scene.globe, *scene.thread, kGpuBytes);
+  auto view = globe::GlobeView::create(*scene.globe, *scene.thread, gpu_bytes);
   if (!view) return view.error();
   scene.view = std::move(*view);
   return scene;

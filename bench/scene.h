@@ -44,9 +44,9 @@ struct Scene {
   std::unique_ptr<globe::Globe> globe;
   std::unique_ptr<globe::GlobeView> view;
 };
-Result<Scene> open_scene(globe::World world, const Setting& setting);
+Result<Scene> open_scene(globe::World world, const Setting& setting, std::size_t gpu_bytes = std::size_t{512} << 20);
 
-/// Errors: unavailable, if the picture is not finished within five minutes.
+/// Errors: unavailable, if the picture is not finished within a quarter of an hour.
 Result<void> finish(Scene& scene, const view::Camera& camera, const globe::ViewSettings& settings);
 
 /// Degrees and metres above the ellipsoid.

@@ -53,7 +53,8 @@ Result<Errors> errors_of(const render::GeoPicture& shown, globe::HeightSampler& 
 Result<void> measure_truth(const TruthView& truth, const Setting& setting, Report& report) {
   auto world = truth.layer ? default_world_with(setting, {{globe::LayerGroup::height, truth.layer}}) : default_world_with(setting, {});
   if (!world) return world.error();
-  auto scene = open_scene(std::move(*world), setting);
+  constexpr std::size_t kRoom = std::size_t{2} << 30;  // mountains a hundred times their height are a gigabyte of tiles
+  auto scene = open_scene(std::move(*world), setting, kRoom);
   if (!scene) return scene.error();
   auto elevation = scene->globe->height_sampler();
   if (!elevation) return elevation.error();
@@ -67,7 +68,7 @@ Result<void> measure_truth(const TruthView& truth, const Setting& setting, Repor
     if (auto finished = finish(*scene, camera, settings); !finished) return finished;
     const auto errors = errors_of(scene->view->measure(camera, settings), *elevation, exaggeration, camera.pixel_angle());
     if (!errors) return errors.error();
-    const std::string note = fmt::format("{} pixels", errors->pixels);
+    const std::string note = fmt::format("{} pixels, chosen for {:.2f} px", errors->pixels, scene->view->stats().max_error_px);
     report.set(fmt::format("x{}.share_within_1px", exaggeration), errors->share_within_1px, note);
     report.set(fmt::format("x{}.worst_px", exaggeration), errors->worst_px, note);
   }

@@ -30,7 +30,7 @@ test_packages=(
   doctest-dev libgeographiclib-dev
   python3 python3-gdal python3-numpy
   imagemagick x11-apps xauth xdotool xvfb
-  mapproxy nginx-light                                         # services and a server to ask
+  mapproxy nginx-light openssl                                 # services and a server to ask
 )
 fuzz_packages=(clang libclang-rt-14-dev)
 bench_packages=(chromium python3 python3-numpy python3-pil)  # bench/compare: the browser, and what a tile server makes tiles with

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <charconv>
 #include <condition_variable>
+#include <cstdlib>
 #include <ctime>
 #include <map>
 #include <mutex>
@@ -51,6 +52,8 @@ struct Transfer {
   Clock::time_point not_before{};  ///< of the next attempt
 
   // While it is in flight.
+  std::string url;                 ///< of the request, or where redirects have led
+  int redirects = 0;               ///< that were followed here
   Easy easy;
   HeaderList headers;
   Reply reply;
@@ -74,6 +77,16 @@ std::string host_of(const std::string& url) {
   const std::string shown = lower(public_part(url));
   const std::size_t scheme = shown.find("://");
   return shown.substr(0, scheme == std::string::npos ? scheme : shown.find('/', scheme + 3));
+}
+
+/// Whether what a source's headers tell `from` may be told `to`: the same server, or the same by a safer protocol.
+bool may_know_headers(const std::string& from, const std::string& to) {
+  const std::string source = host_of(from), target = host_of(to);
+  constexpr std::string_view kPlain = "http://", kSafe = "https://";
+  if (source == target) return true;
+  if (!source.starts_with(kPlain) || !target.starts_with(kSafe)) return false;
+  const auto name = [](std::string_view host) { return host.substr(0, host.find_last_of(":]") == host.rfind(':') ? host.rfind(':') : host.npos); };
+  return name(std::string_view(source).substr(kPlain.size())) == name(std::string_view(target).substr(kSafe.size()));
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -186,6 +199,14 @@ bool is_passing(CURLcode code, long status) {
   return status == 408 || status == 425 || status == 429 || status >= 500;
 }
 
+/// The authorities to trust in place of the system's, by the variables that curl and OpenSSL look at too.
+std::string certificate_file() {
+  for (const char* name : {"CURL_CA_BUNDLE", "SSL_CERT_FILE"}) {
+    if (const char* file = std::getenv(name); file != nullptr && *file != 0) return file;
+  }
+  return {};
+}
+
 Error failure_of(const Transfer& transfer, CURLcode code, long status, const FetchOptions& options) {
   const std::string url = public_part(transfer.request.url);
   if (transfer.not_in_parts || (code == CURLE_OK && status == 206)) {
@@ -195,6 +216,14 @@ Error failure_of(const Transfer& transfer, CURLcode code, long status, const Fet
   if (transfer.too_large) return {ErrorCode::exhausted, fmt::format("{}: the reply is larger than {} MB", url, options.most_bytes >> 20)};
   if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL)
     return {ErrorCode::invalid_argument, fmt::format("{}: no URL of http or https", url)};
+  if (code == CURLE_SSL_CACERT_BADFILE)
+    return {ErrorCode::unsupported, fmt::format("{}: the certificates of {} cannot be read; SSL_CERT_FILE or CURL_CA_BUNDLE names them", url, certificate_file())};
+  if (code == CURLE_PEER_FAILED_VERIFICATION) {
+    return {ErrorCode::unsupported, fmt::format("{}: the server's certificate is not trusted; if it should be, have SSL_CERT_FILE name a file with the "
+                                                "certificate of its authority", url)};
+  }
+  if (code == CURLE_TOO_MANY_REDIRECTS || (code == CURLE_OK && status >= 300 && status < 400))
+    return {ErrorCode::unsupported, fmt::format("{}: leads from one URL to the next, more than {} times", url, kMostRedirects)};
   if (code != CURLE_OK) {
     const bool passing = is_passing(code, status);
     return {passing ? ErrorCode::unavailable : ErrorCode::unsupported,
@@ -205,6 +234,14 @@ Error failure_of(const Transfer& transfer, CURLcode code, long status, const Fet
     return {ErrorCode::unsupported, fmt::format("{}: the server refuses it ({}); check the key or the headers of the source", url, status)};
   if (is_passing(code, status)) return {ErrorCode::unavailable, fmt::format("{}: the server answers {}", url, status)};
   return {ErrorCode::unsupported, fmt::format("{}: the server answers {}", url, status)};
+}
+
+/// Where a reply sends the transfer, if it is to be followed here.
+std::string redirect_of(const Transfer& transfer, CURLcode code) {
+  const char* target = nullptr;
+  const bool sent = code == CURLE_OK && !transfer.request.headers.empty() &&
+                    curl_easy_getinfo(transfer.easy.get(), CURLINFO_REDIRECT_URL, &target) == CURLE_OK && target != nullptr;
+  return sent && transfer.redirects < kMostRedirects ? target : "";
 }
 
 }  // namespace
@@ -243,6 +280,7 @@ struct Fetcher::State {
   explicit State(const FetchOptions& o) : options(o) {}
 
   const FetchOptions options;
+  const std::string certificates = certificate_file();
   CURLM* multi = nullptr;
   std::atomic<std::int64_t> bytes{0};  ///< FetchStats::bytes
 
@@ -303,12 +341,16 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   t.content_range.clear();
   t.too_large = t.not_in_parts = false;
   t.most_bytes = options.most_bytes;
-  ++t.attempts;
+  if (t.url.empty()) {
+    t.url = t.request.url;
+    ++t.attempts;
+  }
   CURL* easy = t.easy.get();
-  curl_easy_setopt(easy, CURLOPT_URL, t.request.url.c_str());
+  curl_easy_setopt(easy, CURLOPT_URL, t.url.c_str());
   curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(easy, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
-  curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 1L);
+  // curl would tell every server that it is sent to what the source's headers say: these redirects are followed here.
+  curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, t.request.headers.empty() ? 1L : 0L);
   curl_easy_setopt(easy, CURLOPT_MAXREDIRS, static_cast<long>(kMostRedirects));
   if (t.request.range) {  // of the bytes as they are: nothing may compress them on the way
     const ByteRange& range = *t.request.range;
@@ -330,8 +372,12 @@ void Fetcher::State::begin(std::unique_ptr<Transfer> transfer) {
   curl_easy_setopt(easy, CURLOPT_HEADERDATA, &t);
   t.headers.reset();
   if (!t.request.etag.empty()) t.headers.reset(curl_slist_append(nullptr, ("If-None-Match: " + t.request.etag).c_str()));
-  for (const std::string& header : t.request.headers) t.headers.reset(curl_slist_append(t.headers.release(), header.c_str()));
+  const bool may_know = may_know_headers(t.request.url, t.url);
+  for (const std::string& header : t.request.headers) {
+    if (may_know) t.headers.reset(curl_slist_append(t.headers.release(), header.c_str()));
+  }
   if (t.headers) curl_easy_setopt(easy, CURLOPT_HTTPHEADER, t.headers.get());
+  if (!certificates.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, certificates.c_str());
   ++t.host->flying;
   flying.emplace(easy, std::move(transfer));
   curl_multi_add_handle(multi, easy);
@@ -358,6 +404,13 @@ void Fetcher::State::end(CURL* easy, CURLcode code) {
   long status = 0;
   curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &status);
   if (status < 400) count_received(*transfer);
+  if (std::string target = redirect_of(*transfer, code); !target.empty()) {
+    transfer->url = std::move(target);
+    ++transfer->redirects;
+    return begin(std::move(transfer));
+  }
+  transfer->url.clear();
+  transfer->redirects = 0;
   transfer->easy.reset();
   bool again = is_passing(code, status) && !transfer->too_large && !transfer->not_in_parts && transfer->attempts < options.most_attempts;
   auto pause = std::chrono::duration_cast<std::chrono::milliseconds>(

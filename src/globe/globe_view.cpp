@@ -10,6 +10,7 @@
 #include "base/bounded_queue.h"
 #include "globe/ground_below.h"
 #include "globe/motion.h"
+#include "globe/patience.h"
 #include "globe/slot_ages.h"
 #include "globe/steps_ahead.h"
 #include "globe/surface_worker.h"
@@ -26,7 +27,6 @@ constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 constexpr std::chrono::seconds kRootDeadline{60};
 constexpr std::chrono::seconds kPause{1};  ///< before a part that failed is asked for again
 constexpr std::chrono::seconds kPauseWithout{5};  ///< the same if it is shown without what failed
-constexpr std::chrono::seconds kPatience{16};  ///< with failures, while nothing arrives: six attempts of a file
 constexpr std::size_t kLeastBytes = 16u << 20;
 constexpr std::size_t kMostWaiting = 128;  ///< parts whose data are on their way
 constexpr std::size_t kMostAhead = 32;     ///< of them those that only a later view wants
@@ -79,9 +79,7 @@ struct GlobeView::State {
   int roots_to_renew = 0;   ///< whose geometry was built by older facts and has not been asked for again
   int roots_renewing = 0;
   std::map<geo::TileKey, Clock::time_point> roots_to_retry;  ///< whose heights failed: a bare ellipsoid stands in until then
-  Clock::time_point last_progress;   ///< when a part or a byte of one arrived
-  std::int64_t last_bytes_fetched = 0;
-  bool failed_in_vain = false;       ///< since then
+  Patience patience;
   int max_in_flight = 0;
   std::size_t max_bytes = 0;
   Clock::time_point created = Clock::now();
@@ -107,7 +105,6 @@ struct GlobeView::State {
   void wait_for_half(Clock::time_point deadline);
   Result<void> upload(const Finished& item);
   bool make_room(Part part);
-  void note_progress();
   Clock::time_point note_failure(const Error& error, std::chrono::seconds pause);
   bool has_given_up();
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
@@ -273,11 +270,11 @@ void GlobeView::State::take_over(Finished item) {
     return tree.failed(item.key, item.part, retry_at);
   }
   if (item.part == Part::geometry) {
-    note_progress();
+    patience.progressed(Clock::now());
     const auto& geometry = std::get<surface::TileGeometry>(item.content);
     tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
   } else if (tree.arrived_colour(item.key); missing.empty()) {
-    note_progress();
+    patience.progressed(Clock::now());
     slots.composed(item.key, current);
   } else {
     slots.composed_without(item.key, missing, note_failure(std::get<surface::TileImagery>(item.content).missing.front().error, kPauseWithout));
@@ -372,22 +369,15 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
 /// When what failed so may be asked for again.
 Clock::time_point GlobeView::State::note_failure(const Error& error, std::chrono::seconds pause) {
   if (error.code != ErrorCode::unavailable) return Clock::time_point::max();
-  failed_in_vain = true;
+  patience.failed();
   return Clock::now() + pause;
-}
-
-void GlobeView::State::note_progress() {
-  last_progress = Clock::now();
-  failed_in_vain = false;
 }
 
 /// Whether all that is missing has failed for good, or goes on failing while nothing arrives.
 bool GlobeView::State::has_given_up() {
-  if (const std::int64_t bytes = globe.fetch_stats().bytes; bytes != last_bytes_fetched) {
-    last_bytes_fetched = bytes;
-    note_progress();
-  }
-  if (failed_in_vain && Clock::now() - last_progress > kPatience) return true;
+  const auto now = Clock::now();
+  patience.received(globe.fetch_stats().bytes, now);
+  if (patience.is_over(now)) return true;
   const bool idle = in_flight == 0 && waiting.empty() && roots_to_renew == 0 && roots_to_retry.empty() && selection->requests.empty();
   return idle && !selection->stats.retries_later && !stale.may_change && first_facts == globe.facts();
 }
@@ -490,7 +480,7 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
   State& s = *state_;
   if (!s.globe.wait_for_tables(deadline)) return false;
   constexpr double kNoLimit = 1e9;
-  s.note_progress();
+  s.patience.progressed(Clock::now());
   for (;;) {
     s.update(camera, settings, kNoLimit);
     if (s.stats.complete) return true;

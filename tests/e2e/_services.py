@@ -212,14 +212,16 @@ error_log {folder}/nginx_errors.log;
 events {{ worker_connections 128; }}
 http {{
   types {{ text/xml xml; image/png png; }}
-  access_log {folder}/nginx_access.log;
+  log_format short '$server_protocol $status $request_uri';
+  access_log {folder}/nginx_access.log short;
   client_body_temp_path {folder}/nginx_a; proxy_temp_path {folder}/nginx_b; fastcgi_temp_path {folder}/nginx_c;
   uwsgi_temp_path {folder}/nginx_d; scgi_temp_path {folder}/nginx_e;
   gzip on; gzip_types text/xml image/png; gzip_min_length 100;
   server {{
     listen 127.0.0.1:{port};
+    {tls}
     root {root};
-    limit_rate 64k;
+    limit_rate {rate};
     etag on;
     expires 1h;
   }}
@@ -227,13 +229,33 @@ http {{
 """
 
 
-def nginx(folder):
-    """nginx over the shared folder: 64 kB/s for each reply, gzip; gives the program and its URL."""
+TLS = """
+    listen 127.0.0.1:{port} ssl http2;
+    ssl_certificate {certificate};
+    ssl_certificate_key {key};
+"""
+
+
+def certificate(folder):
+    """A certificate of 127.0.0.1 that nobody vouches for, and its key."""
+    file, key = pathlib.Path(folder) / "certificate.pem", pathlib.Path(folder) / "key.pem"
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1",
+                    "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", file], check=True, capture_output=True)
+    return file, key
+
+
+def nginx(folder, tls_port=None, rate="64k"):
+    """nginx over the shared folder: 64 kB/s for each reply, gzip; gives the program and its URL. With `tls_port` it also answers
+    there, by HTTP/2, with the certificate of the folder."""
     program = shutil.which("nginx", path=os.environ.get("PATH", "") + ":/usr/sbin")
     if not program:
         sys.exit("nginx is missing: run tools/setup.sh --test")
     folder, port = pathlib.Path(folder), free_port()
     config = folder / "nginx.conf"
-    config.write_text(NGINX.format(folder=folder, port=port, root=SHARED))
+    tls = ""
+    if tls_port:
+        file, key = certificate(folder)
+        tls = TLS.format(port=tls_port, certificate=file, key=key)
+    config.write_text(NGINX.format(folder=folder, port=port, root=SHARED, tls=tls, rate=rate))
     base = f"http://127.0.0.1:{port}"
     return Program([program, "-p", str(folder), "-e", str(folder / "nginx_errors.log"), "-c", str(config)], f"{base}/README.md", folder), base

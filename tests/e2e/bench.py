@@ -1,5 +1,5 @@
 """tellurion bench: names, a cheap benchmark, the shape of its JSON. The figures themselves are in docs/PERFORMANCE.md."""
-# timeout: 240
+# timeout: 120
 import json
 import os
 import unittest
@@ -46,14 +46,6 @@ class Bench(Case):
         with open("/proc/cpuinfo") as stream:
             model = next((line.split(": ")[1].strip() for line in stream if line.startswith("model name")), "")
         self.assertIn(model, done.stdout.splitlines()[0])
-
-    def test_a_frame_of_a_finished_view_allocates_nothing(self):
-        file = self.folder / "bench.json"
-        self.tellurion("bench", "frame.rainier.allocations", "--quick", "--json", file)
-        (figure,) = json.loads(file.read_text())
-        if figure["value"] is None and "not measured" not in figure["note"]:
-            self.skipTest("a sanitizer's build does not count")
-        self.assertEqual(figure["value"], 0, figure["note"])
 
     def test_what_cannot_be_measured_says_why(self):
         file = self.folder / "bench.json"

@@ -1,9 +1,10 @@
-"""A five-minute flight round the world within small caches: what the process takes, frame by frame."""
+"""A five-minute flight round the world within small caches: what the process takes, frame by frame; what a frame at rest takes."""
 # label: slow
 # timeout: 2400
+import json
 import unittest
 
-from _common import BLUE_MARBLE, ETOPO5, EVEREST, RAINIER, Case, read_trace
+from _common import BLUE_MARBLE, ETOPO5, EVEREST, RAINIER, SHARED, Case, read_trace
 
 MB = 1 << 20
 LARGEST_TILE = 4 * MB  # a 512x512 picture with its mip levels, with room to spare
@@ -36,6 +37,12 @@ class Memory(Case):
                 self.assertGreater(min(line[name] for line in lines), 0)
                 self.assertLessEqual(most[name], budget, f"in frame {most['frame']:.0f}")
         self.assertTrue(all(line["complete"] == 1 for line in lines), "every frame is finished")
+
+    def test_a_frame_of_a_finished_view_allocates_nothing(self):
+        file = self.folder / "bench.json"
+        self.tellurion("bench", "frame.rainier.allocations", "--quick", "--data", SHARED, "--json", file)
+        (figure,) = json.loads(file.read_text())
+        self.assertEqual(figure["value"], 0, figure["note"])
 
 
 if __name__ == "__main__":

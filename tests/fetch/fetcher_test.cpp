@@ -130,6 +130,32 @@ TEST_CASE("Fetcher: cut-off, stalled and endless replies fail; redirects are fol
   CHECK_FALSE(fetch_one(server, "/round", once));
 }
 
+TEST_CASE("Fetcher: a source's headers go where redirects lead on the same server, and to no other") {
+  const auto remember = [](std::string& headers) {
+    return [&](const Ask& ask) {
+      headers = ask.headers;
+      return Say{.body = "here"};
+    };
+  };
+  std::string told_other;
+  const LittleServer other(remember(told_other));
+  std::string told;
+  const LittleServer server([&](const Ask& ask) {
+    if (ask.path == "/away") return Say{.status = 302, .headers = {"Location: " + other.url("/there")}};
+    if (ask.path == "/turn") return Say{.status = 307, .headers = {"Location: there"}};
+    if (ask.path == "/round") return Say{.status = 302, .headers = {"Location: /round"}};
+    return remember(told)(ask);
+  });
+  CHECK(fetch_one(server, "/turn", hasty(), {"X-Key: sesame"}).value().body == "here");
+  CHECK(told.find("X-Key: sesame\r\n") != std::string::npos);
+  CHECK(fetch_one(server, "/away", hasty(), {"X-Key: sesame"}).value().body == "here");
+  CHECK(told_other.find("sesame") == std::string::npos);
+  const Outcome round = fetch_one(server, "/round", hasty(), {"X-Key: sesame"});
+  REQUIRE_FALSE(round);
+  CHECK(round.error().message.find("more than 5 times") != std::string::npos);
+  CHECK(server.asked("/round") == 6);
+}
+
 TEST_CASE("Fetcher: other protocols are refused, and messages hold no credentials") {
   Outcomes outcomes;
   Fetcher fetcher(hasty());
