@@ -70,12 +70,15 @@ void main() {
 #ifdef EFFECTS
   vec4 effects = texture(u_effects, vec3(v_uv.xy, u_tile[7].w));
   colour += v_eye.w * effects.rgb * effects.rgb;
-  // The sun's mirror image in water under a moderate wind, spread by its waves: Blinn's lobe as wide as their slopes
-  // (variance 0.02), weakened by Schlick's approximation of Fresnel's share for water.
-  vec3 to_eye = normalize(v_eye.xyz);
-  vec3 half_way = normalize(normalize(v_sun.xyz) + to_eye);
-  float mirrored = 0.02 + 0.98 * pow(1.0 - clamp(dot(half_way, to_eye), 0.0, 1.0), 5.0);
-  colour += effects.a * mirrored * 12.5 * pow(max(half_way.z, 0.0), 100.0) * v_sunlight.rgb * max(v_sun.z, 0.0);
+  // The sun mirrored by waves: slopes as Cox and Munk (1954, doi:10.1364/JOSA.44.000838) measured under a wind of 5 m/s, variance
+  // 0.0286, and Schlick's approximation of what water reflects. The half-way vector to a unit sun and eye has the length
+  // 2 cos(angle of incidence).
+  vec3 half_way = v_sun.xyz + v_eye.xyz * inversesqrt(dot(v_eye.xyz, v_eye.xyz));
+  float squared = dot(half_way, half_way);
+  float slope_squared = squared / max(half_way.z * half_way.z, 1e-6) - 1.0;
+  float grazing = 1.0 - 0.5 * sqrt(squared), twice = grazing * grazing;
+  float mirrored = (0.02 + 0.98 * twice * twice * grazing) / (4.0 * 0.0286) * exp2(-slope_squared / (0.0286 * 0.6931));
+  colour += effects.a * mirrored * v_sunlight.rgb;
 #endif
   colour += vec3(v_sun.w, v_sunlight.w, v_ambient.w);
 #else

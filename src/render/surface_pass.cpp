@@ -61,12 +61,21 @@ glm::vec4 slot_place(const geo::TileKey& tile, const geo::TileKey& owner, int si
           edge + inner * part * static_cast<double>(tile.y - first_y), layer};
 }
 
-/// Whether of a tile's effects some may be seen under a sun at this height over its middle (sine): lights where it is dark
-/// somewhere, water where it is not (see shaders/surface.vert).
-bool shows_effects(const ResidentTile& tile, int level, double sun_height) {
-  constexpr double kNightBegins = 0.02, kDayBegins = -0.03;
-  const double reach = std::ldexp(1.2, -level);  // more than from its middle to a corner, radians
-  return tile.effects && ((tile.has_night && sun_height < kNightBegins + reach) || (tile.has_water && sun_height > kDayBegins - reach));
+/// Whether of a tile's effects some may be seen: lights where it is dark somewhere, water where it mirrors the sun into the eye
+/// (see shaders/surface.frag). `owner` has the slot; `up`: at the middle of the drawn tile, `origin` its origin seen from the eye, metres.
+bool shows_effects(const ResidentTile& owner, const glm::dvec3& up, int level, const glm::dvec3& origin, const glm::dvec3& to_sun) {
+  constexpr double kNightBegins = 0.02, kGlintEnds = 0.55;  // sine of the sun's height; radians from the mirror's direction
+  if (!owner.effects) return false;
+  const double reach = std::ldexp(1.2, -level);  // radians: more than from its middle to a corner
+  if (owner.has_night && glm::dot(up, to_sun) < kNightBegins + reach) return true;
+  if (!owner.has_water) return false;
+  constexpr double kRadius = 7e6;  // metres, as large as the Earth's at least: only how far effects are looked for depends on it
+  const double distance = glm::length(origin), radius = reach * kRadius;
+  if (radius >= distance) return true;
+  const glm::dvec3 half_way = to_sun - origin / distance;
+  const double length = std::max(glm::length(half_way), 1e-3);
+  const double turn = std::asin(radius / distance) / length;  // of the half-way vector, within the tile
+  return glm::dot(half_way, up) > length * std::cos(std::min(kGlintEnds + reach + turn, 3.14));
 }
 
 struct TileUniforms {
@@ -156,14 +165,14 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     const auto colour_owner = tile.colour_owner == tile.key ? resident : store.find(tile.colour_owner);
     const bool fades = tile.fade < 1.0f && tile.colour_before != tile.colour_owner;
     const bool renews = !fades && colour_owner && colour_owner->colour_before;
-    const bool has_effects = colour_owner && shows_effects(*colour_owner, tile.key.level, glm::dot(mesh.origin_up(), to_sun));
+    const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
+    const bool has_effects = colour_owner && shows_effects(*colour_owner, mesh.origin_up(), tile.key.level, offset, to_sun);
     const gpu::LinkedProgram* program = programs[fades || renews ? 1 : 0][has_effects ? 1 : 0];
     if (program != in_use) {
       glUseProgram(program->program.name());
       in_use = program;
     }
 
-    const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
     const glm::vec3 upper(offset);
     const glm::vec3 lower(offset - glm::dvec3(upper));
     const auto slope_owner = tile.slope_owner == tile.key ? resident : store.find(tile.slope_owner);
