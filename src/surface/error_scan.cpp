@@ -72,16 +72,6 @@ struct OnPath {
   }
 };
 
-/// Where the sample of a column or row lies; two more on either side stand for the border and the end of the slope beyond it.
-double sample_place(int i, int size) { return i < 0 ? i + 1 : i >= size ? i : i + 0.5; }
-
-/// Adds those two to a range of columns or rows that reaches an end of the raster.
-void include_border(int& first, int& count, int size) {
-  const int last = first + count == size ? size + 2 : first + count;
-  if (first == 0) first = -2;
-  count = last - first;
-}
-
 /// A sample of a raster, seen from the face.
 struct FaceSample {
   glm::dvec2 uv{NAN};
@@ -241,9 +231,7 @@ class Scanner {
   Result<void> scan_raster(cache::CachedRaster& raster, bool is_finest) {
     source::PixelWindow window = window_under(raster.reader(), raster.description(), path_.back().key);
     if (window.width <= 0 || window.height <= 0) return {};
-    const source::LevelSize& size = raster.description().levels.front();
-    include_border(window.y, window.height, size.height);
-    if (!raster.description().wraps) include_border(window.x, window.width, size.width);
+    include_border(window, raster.description());
     // Samples just outside shape the surface within: three of them, in face coordinates.
     const double quarter = model_.description().ellipsoid.b() * std::numbers::pi / 4.0;
     const double ring = 3.0 * raster.description().spacing.value / quarter;

@@ -54,15 +54,33 @@ source::PixelWindow window_under(source::RasterReader& reader, const source::Ras
   return window;
 }
 
+double sample_place(int i, int size) { return i < 0 ? i + 1 : i >= size ? i : i + 0.5; }
+
+void include_border(source::PixelWindow& window, const source::RasterDescription& about) {
+  const source::LevelSize& size = about.levels.front();
+  const auto include = [](int& first, int& count, int length) {
+    const int end = first + count == length ? length + 2 : first + count;
+    if (first == 0) first = -2;
+    count = end - first;
+  };
+  include(window.y, window.height, size.height);
+  if (!about.wraps) include(window.x, window.width, size.width);
+}
+
 std::vector<TileSample> samples_under(source::RasterReader& reader, const source::RasterDescription& about, const geo::TileKey& key) {
-  const source::PixelWindow window = window_under(reader, about, key);
-  const int columns = about.levels.front().width;
+  source::PixelWindow window = window_under(reader, about, key);
+  if (window.width <= 0 || window.height <= 0) return {};
+  include_border(window, about);
+  const source::LevelSize size = about.levels.front();
   const geo::FaceRect rect = geo::face_rect(key);
   std::vector<TileSample> samples;
-  std::vector<glm::dvec2> row(static_cast<std::size_t>(std::max(window.width, 0)));
+  std::vector<glm::dvec2> row(static_cast<std::size_t>(window.width));
   std::vector<geo::LatLon> places(row.size());
   for (int y = window.y; y < window.y + window.height; ++y) {
-    for (std::size_t i = 0; i < row.size(); ++i) row[i] = {(window.x + static_cast<int>(i)) % columns + 0.5, y + 0.5};
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const int x = window.x + static_cast<int>(i);
+      row[i] = {about.wraps ? x % size.width + 0.5 : sample_place(x, size.width), sample_place(y, size.height)};
+    }
     reader.to_places(row, places);
     for (const geo::LatLon& place : places) {
       if (!std::isfinite(place.latitude.value) || !std::isfinite(place.longitude.value)) continue;

@@ -21,7 +21,14 @@ struct TileSample {
 /// Wholly conservative; of no width where nothing touches.
 source::PixelWindow window_under(source::RasterReader& reader, const source::RasterDescription& about, const geo::TileKey& key);
 
-/// All samples of level 0 within the tile. For tiles whose grid is about as fine as the samples or finer: there are few.
+/// Where the sample of a column or row of `size` lies, in pixels; the two before the first and the two after the last stand for
+/// the raster's border and the end of the slope beyond it, where the surface has its other creases.
+double sample_place(int i, int size);
+
+/// Adds those to a window that reaches an end of the raster.
+void include_border(source::PixelWindow& window, const source::RasterDescription& about);
+
+/// All samples of level 0 within the tile, and the places that stand for the raster's border. For tiles whose grid is about as fine as the samples or finer: there are few.
 std::vector<TileSample> samples_under(source::RasterReader& reader, const source::RasterDescription& about, const geo::TileKey& key);
 
 }  // namespace tellurion::surface
