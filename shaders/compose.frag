@@ -2,6 +2,7 @@
 layout(location = 0) out vec4 o_colour;
 
 uniform sampler2D u_image;
+uniform sampler2D u_below;    // the slot as it was before
 uniform vec4 u_image_texels;  // xy: size of the image in texels; zw: of the texture that holds it
 uniform vec3 u_adjust;        // opacity, gamma, multiplier
 
@@ -22,6 +23,14 @@ void main() {
 #ifdef MASK
   if (colour.a < 0.5) discard;
   o_colour = vec4(colour.r / colour.a);
+#elif defined(GRAYSCALE)
+  // The image's brightness as the V of HSV: hue and saturation stay if red, green and blue keep their ratios. Where nothing
+  // lies below, or black, there is no hue.
+  vec4 below = texelFetch(u_below, ivec2(gl_FragCoord.xy), 0);
+  float grey = colour.r / max(colour.a, 1.0 / 255.0);
+  float value = max(max(below.r, below.g), below.b);
+  vec3 tinted = value > 0.0 ? below.rgb * (grey / value) : vec3(grey);
+  o_colour = vec4(mix(vec3(grey), tinted, below.a), 1.0) * (colour.a * u_adjust.x);
 #else
   o_colour = colour * u_adjust.x;
 #endif

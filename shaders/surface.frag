@@ -9,7 +9,8 @@ uniform sampler2DArray u_colour;
 uniform sampler2DArray u_slope;
 uniform sampler2DArray u_before;
 uniform sampler2DArray u_effects;
-uniform vec4 u_tile[8];
+uniform sampler2DArray u_overlay;
+uniform vec4 u_tile[9];
 
 in vec4 v_uv;
 #ifdef LOG_DEPTH
@@ -87,6 +88,10 @@ void main() {
   colour = sqrt(colour);
 #endif
 
+#ifdef OVERLAY
+  vec4 overlay = texture(u_overlay, vec3(v_uv.xy, u_tile[8].x));
+  colour = overlay.rgb + (1.0 - overlay.a) * colour;
+#endif
 #ifdef BORDERS
   vec2 inside = min(v_st, 1.0 - v_st) / fwidth(v_st);  // pixels
   float line = clamp(1.5 - min(inside.x, inside.y), 0.0, 1.0);

@@ -9,7 +9,8 @@ layout(location = 4) in float a_skirt;
 // 2: normal at the origin; skirt depth            3: tangent of the slope map; level
 // 4: colour slot's scale, offset, layer           5: slope slot's likewise
 // 6: the slot that it fades from, likewise        7: fade; sink depth, sink level; layer of the effects
-uniform vec4 u_tile[8];
+// 8: layer of the overlay
+uniform vec4 u_tile[9];
 
 // Few and full: a software rasteriser pays for every one of a triangle.
 out vec4 v_uv;            // of the colour slot, of the slope slot

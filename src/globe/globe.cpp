@@ -36,13 +36,10 @@ int default_worker_count() {
   return std::max(static_cast<int>(std::thread::hardware_concurrency()) - 1, 1);
 }
 
-bool is_drawn(LayerGroup group) {
-  return group != LayerGroup::grayscale_overlay && group != LayerGroup::overlay;
-}
-
 source::SampleKind kind_of(LayerGroup group) {
   if (group == LayerGroup::height) return source::SampleKind::height;
-  return group == LayerGroup::grayscale || group == LayerGroup::water ? source::SampleKind::grey : source::SampleKind::colour;
+  const bool is_grey = group == LayerGroup::grayscale || group == LayerGroup::grayscale_overlay || group == LayerGroup::water;
+  return is_grey ? source::SampleKind::grey : source::SampleKind::colour;
 }
 
 }  // namespace
@@ -212,7 +209,7 @@ void Globe::State::open_layers() {
     info.spec = spec;
     SourceStats stats;
     stats.name = spec.name;
-    if (spec.enabled && is_drawn(spec.group) && !spec.source.time) {
+    if (spec.enabled && !spec.source.time) {
       auto source = open_source(spec);
       if (source) {
         info.raster = std::move(*source);
@@ -225,11 +222,7 @@ void Globe::State::open_layers() {
     layers.push_back(std::move(info));
     sources.push_back(std::move(stats));
   }
-  std::vector<LayerInfo> drawn = layers;
-  for (LayerInfo& info : drawn) {
-    if (!is_drawn(info.spec.group)) info.spec.source.time.reset();
-  }
-  steps = std::make_unique<SurfaceSteps>(world.ellipsoid, drawn, [this](const LayerSpec& spec) { return open_source(spec); });
+  steps = std::make_unique<SurfaceSteps>(world.ellipsoid, layers, [this](const LayerSpec& spec) { return open_source(spec); });
   surface = steps->at(options.time);
   for (std::size_t i = 0; i < layers.size(); ++i) layers[i].raster = steps->raster_at(i, options.time);
 }

@@ -443,6 +443,7 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   render::RendererOptions options;
   options.ellipsoid = globe.ellipsoid();
   options.gpu_budget_bytes = gpu_budget_bytes;
+  options.overlays = std::ranges::any_of(globe.layers(), [](const LayerInfo& layer) { return layer.spec.group == LayerGroup::overlay; });
   auto renderer = render::Renderer::create(thread, options);
   if (!renderer) return renderer.error();
   state->renderer = std::move(*renderer);

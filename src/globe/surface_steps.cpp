@@ -17,6 +17,20 @@ LayerSpec spec_of_step(const LayerSpec& layer, const std::string& time) {
   return spec;
 }
 
+/// Of a layer of images. What lies over the grayscale is drawn as colours are: it follows them in the order of groups.
+surface::ImageUse use_of(LayerGroup group) {
+  switch (group) {
+    case LayerGroup::grayscale: return surface::ImageUse::grayscale;
+    case LayerGroup::water: return surface::ImageUse::water;
+    case LayerGroup::night: return surface::ImageUse::night;
+    case LayerGroup::overlay: return surface::ImageUse::overlay;
+    case LayerGroup::height:
+    case LayerGroup::color:
+    case LayerGroup::grayscale_overlay: break;
+  }
+  return surface::ImageUse::colour;
+}
+
 }  // namespace
 
 SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open)
@@ -103,8 +117,7 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
     layer.gamma = static_cast<float>(one.spec.gamma);
     layer.multiplier = static_cast<float>(one.spec.multiplier);
     layer.adds = one.spec.adds;
-    if (one.spec.group == LayerGroup::night) layer.use = surface::ImageUse::night;
-    if (one.spec.group == LayerGroup::water) layer.use = surface::ImageUse::water;
+    layer.use = use_of(one.spec.group);
     (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
   }
   surfaces_.emplace_front(std::move(steps), description);

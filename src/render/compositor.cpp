@@ -13,7 +13,7 @@ namespace {
 
 using surface::ImagePatch;
 
-constexpr std::uint32_t kAdjust = 1, kMask = 2;  // feature bits
+constexpr std::uint32_t kAdjust = 1, kMask = 2, kGrayscale = 4;  // feature bits
 constexpr std::size_t kMaxScratch = 8;
 enum Uniform { u_slot_range, u_cells, u_image_texels, u_adjust };
 
@@ -26,7 +26,7 @@ float to_clip(float st) { return 2.0f * (kGutter + st * (kSide - 2.0f * kGutter)
 /// Whether nothing below the patch can be seen.
 bool hides_all(const ImagePatch& p) {
   constexpr float kEdge = 1.0f - 1e-3f / kSide;
-  return p.opaque && p.opacity >= 1.0f && to_clip(p.lower.x) <= -kEdge && to_clip(p.lower.y) <= -kEdge &&
+  return p.use != surface::ImageUse::grayscale && p.opaque && p.opacity >= 1.0f && to_clip(p.lower.x) <= -kEdge && to_clip(p.lower.y) <= -kEdge &&
          to_clip(p.upper.x) >= kEdge && to_clip(p.upper.y) >= kEdge;
 }
 
@@ -37,11 +37,11 @@ int size_class(int size) { return static_cast<int>(std::bit_ceil(static_cast<uns
 Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
   gpu::ProgramFamily programs({shader_texts({"compose.vert"}),
                                shader_texts({"compose.frag"}),
-                               {"ADJUST", "MASK"},
+                               {"ADJUST", "MASK", "GRAYSCALE"},
                                {"u_slot_range", "u_cells", "u_image_texels", "u_adjust"},
-                               {"u_image"},
+                               {"u_image", "u_below"},
                                {}});
-  for (const std::uint32_t features : {0u, kAdjust, kMask, kAdjust | kMask}) {
+  for (const std::uint32_t features : {0u, kAdjust, kMask, kAdjust | kMask, kGrayscale, kAdjust | kGrayscale}) {
     const auto program = programs.variant(thread, features);
     if (!program) return program.error();
   }
@@ -56,7 +56,14 @@ Compositor::Compositor(gpu::RenderThread& thread, gpu::ProgramFamily programs, g
       array_(thread),
       no_array_(thread),
       cells_(thread),
-      target_(thread) {
+      target_(thread),
+      below_(thread) {
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, below_.name());
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, surface::kColourSlotSide, surface::kColourSlotSide, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   scratch_.reserve(kMaxScratch + 1);
   glBindVertexArray(array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, cells_.name());
@@ -77,6 +84,13 @@ void Compositor::begin(const SlotPool& pool, Slot slot) {
   glDisable(GL_CULL_FACE);
   glDisable(GL_SCISSOR_TEST);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
+void Compositor::keep_below() {
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, below_.name());
+  glCopyTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, 0, 0, surface::kColourSlotSide, surface::kColourSlotSide);
+  glActiveTexture(GL_TEXTURE0);
 }
 
 Result<void> Compositor::compose(gpu::RenderThread& thread, std::span<const ImagePatch> patches, const SlotPool& pool,
@@ -113,9 +127,10 @@ Result<void> Compositor::compose_effects(gpu::RenderThread& thread, std::span<co
 Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch, Budget& budget) {
   assert(patch.columns > 0 && patch.rows > 0 && patch.image.width > 0 && patch.image.height > 0);
   const bool adjusts = patch.gamma != 1.0f || patch.multiplier != 1.0f;
-  const bool is_mask = patch.use == surface::ImageUse::water;
-  const auto program = programs_.variant(thread, (adjusts ? kAdjust : 0u) | (is_mask ? kMask : 0u));
+  const bool is_mask = patch.use == surface::ImageUse::water, is_grayscale = patch.use == surface::ImageUse::grayscale;
+  const auto program = programs_.variant(thread, (adjusts ? kAdjust : 0u) | (is_mask ? kMask : 0u) | (is_grayscale ? kGrayscale : 0u));
   if (!program) return program.error();
+  if (is_grayscale) keep_below();
 
   const Scratch& scratch = scratch_for(thread, patch.image, budget);
   const GLint filter = patch.linear ? GL_LINEAR : GL_NEAREST;

@@ -17,8 +17,9 @@ class Compositor {
  public:
   static Result<Compositor> create(gpu::RenderThread& thread);
 
-  /// Fills `slot` with the patches, lowest first; what none covers is transparent. Every patch must have an image that a
-  /// texture can hold and (columns + 1) * (rows + 1) points (asserted).
+  /// Fills `slot` with the patches, lowest first; what none covers is transparent. Those of grayscale give their brightness to
+  /// what lies below them: it becomes the V of HSV. Every patch must have an image that a texture can hold and
+  /// (columns + 1) * (rows + 1) points (asserted).
   Result<void> compose(gpu::RenderThread& thread, std::span<const surface::ImagePatch> patches, const SlotPool& pool,
                        Slot slot, Budget& budget);
   /// The same with patches of night and water: the light of the night becomes the slot's red, green and blue, the share of water its
@@ -41,6 +42,8 @@ class Compositor {
   Scratch& scratch_for(gpu::RenderThread& thread, const raster::Image& image, Budget& budget);
   void upload_cells(const surface::ImagePatch& patch);
   void begin(const SlotPool& pool, Slot slot);
+  /// Keeps what has been drawn into the slot so far, for the next patch to read.
+  void keep_below();
   Result<void> draw(gpu::RenderThread& thread, const surface::ImagePatch& patch, Budget& budget);
   Result<void> make_levels(gpu::RenderThread& thread, const SlotPool& pool, Slot slot);
 
@@ -50,6 +53,7 @@ class Compositor {
   gpu::VertexArray no_array_;  // for draws that need no vertices
   gpu::Buffer cells_;
   gpu::Framebuffer target_;
+  gpu::Texture below_;         // a slot's first level as it was before a patch
   std::vector<Scratch> scratch_;
   std::vector<float> cell_points_;
   std::uint64_t use_ = 0;

@@ -20,9 +20,10 @@ using surface::DrawTile;
 
 constexpr int kSamples = 4;
 
-std::uint32_t features_of(const FrameLook& look, bool air, bool reversed) {
-  return (look.lighting ? SurfacePass::light : 0u) | (look.atmosphere && air ? SurfacePass::atmosphere : 0u) |
-         (look.tile_borders ? SurfacePass::borders : 0u) | (reversed ? 0u : SurfacePass::log_depth);
+std::uint32_t features_of(const FrameLook& look, const RendererOptions& options, bool reversed) {
+  return (look.lighting ? SurfacePass::light : 0u) | (look.atmosphere && options.air ? SurfacePass::atmosphere : 0u) |
+         (look.tile_borders ? SurfacePass::borders : 0u) | (reversed ? 0u : SurfacePass::log_depth) |
+         (options.overlays ? SurfacePass::overlay : 0u);
 }
 
 /// What of a look drivers compile for.
@@ -50,16 +51,18 @@ surface::TileGeometry triangle_before(const view::Camera& camera) {
   return geometry;
 }
 
-/// Imagery with effects, of one texel.
-surface::TileImagery imagery_of_a_texel() {
+/// Of one texel.
+surface::TileImagery imagery_of_a_texel(bool has_effects, bool has_overlay) {
   surface::ImagePatch patch;
   patch.image = {1, 1, {255, 255, 255, 255}};
   patch.columns = patch.rows = 1;
   patch.image_points = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   surface::TileImagery imagery;
   imagery.patches = {patch};
+  patch.use = surface::ImageUse::overlay;
+  if (has_overlay) imagery.overlays = {patch};
   patch.use = surface::ImageUse::night;
-  imagery.effects = {std::move(patch)};
+  if (has_effects) imagery.effects = {std::move(patch)};
   return imagery;
 }
 
@@ -104,11 +107,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(gpu::RenderThread& thread, co
   auto sky = SkyPass::create(thread);
   if (!sky) return sky.error();
   auto state = std::make_unique<State>(thread, options, std::move(*compositor), std::move(*sky));
-  const std::uint32_t features = features_of({}, options.air.has_value(), thread.capabilities().clip_control);
-  constexpr std::uint32_t kFade = SurfacePass::fade, kEffects = SurfacePass::effects;
-  for (const std::uint32_t more : {0u, kFade, kEffects, kFade | kEffects}) {
-    if (auto prepared = state->surface.prepare(thread, features | more); !prepared) return prepared.error();
-  }
+  const std::uint32_t features = features_of({}, options, thread.capabilities().clip_control);
+  if (auto prepared = state->surface.prepare(thread, features); !prepared) return prepared.error();
   if (auto warmed = state->store.warm_up(thread); !warmed) return warmed.error();
   std::unique_ptr<Renderer> renderer(new Renderer(std::move(state)));
   renderer->warm_up(thread, {});
@@ -189,8 +189,7 @@ FrameFigures Renderer::State::draw_passes(gpu::RenderThread& thread, const view:
   const glm::vec4 clear(look.clear, 1.0f);
   glClearBufferfv(GL_COLOR, 0, &clear.x);
 
-  const bool air = options.air.has_value();
-  const std::uint32_t features = features_of(look, air, thread.capabilities().clip_control);
+  const std::uint32_t features = features_of(look, options, thread.capabilities().clip_control);
   surface.set_anisotropy(thread, look.anisotropy);
   FrameFigures figures = surface.draw(thread, camera, look.exaggeration, look.to_sun.xyz, features, tiles, store);
   if (look.wireframe) {
@@ -198,7 +197,7 @@ FrameFigures Renderer::State::draw_passes(gpu::RenderThread& thread, const view:
     figures.draws += surface.draw(thread, camera, look.exaggeration, look.to_sun.xyz, SurfacePass::wireframe | depth, tiles, store).draws;
   }
   if (look.bounds) surface.draw_boxes(thread, camera, look.exaggeration, features, tiles, store);
-  if (look.atmosphere && air) {
+  if (look.atmosphere && options.air) {
     glDisable(GL_CULL_FACE);
     sky.draw(thread);
     ++figures.draws;
@@ -226,22 +225,20 @@ bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   // One triangle through every variant, into targets of the same kinds: drivers compile at the first draw.
   thread.check();
   State& s = *state_;
-  const LookPrograms programs{features_of(look, s.options.air.has_value(), thread.capabilities().clip_control), look.wireframe, look.bounds,
+  const LookPrograms programs{features_of(look, s.options, thread.capabilities().clip_control), look.wireframe, look.bounds,
                               look.antialiasing};
   if (std::find(s.warm.begin(), s.warm.end(), programs) != s.warm.end()) return false;
   s.warm.push_back(programs);
-  const geo::TileKey key{.face = geo::kFaceCount};  // no tile of the planet
   view::Camera camera;
   camera.width = camera.height = 16;
   camera.eye = {{2.0 * s.options.ellipsoid.a(), 0.0, 0.0}};
-  if (!s.store.upload_geometry(thread, key, triangle_before(camera))) return true;
-  const bool has_effects = s.store.upload_colour(thread, key, imagery_of_a_texel()).has_value();
-  geo::TileKey without = key;  // a tile that is not there
-  ++without.face;
   std::vector<DrawTile> tiles;
-  for (const geo::TileKey& owner : {without, key}) {
-    DrawTile tile{.key = key, .colour_owner = owner, .colour_before = owner, .slope_owner = key};
+  for (std::uint8_t i = 0; i < (s.options.overlays ? 4 : 2); ++i) {
+    const geo::TileKey key{.face = static_cast<std::uint8_t>(geo::kFaceCount + i)};  // no tile of the planet
+    if (!s.store.upload_geometry(thread, key, triangle_before(camera))) break;
+    DrawTile tile{.key = key, .colour_owner = key, .colour_before = key, .slope_owner = key};
     tiles.push_back(tile);
+    if (!s.store.upload_colour(thread, key, imagery_of_a_texel((i & 1) != 0, (i & 2) != 0))) break;
     tile.colour_before.face = 0;
     tile.fade = 0.5f;
     tiles.push_back(tile);
@@ -250,8 +247,9 @@ bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   s.draw_passes(thread, camera, look, tiles, target);
   glFinish();
   target.release(s.store.budget());
-  s.store.release(key, surface::Part::geometry);
-  if (has_effects) s.store.release(key, surface::Part::colour);
+  for (const DrawTile& tile : tiles) {
+    for (const surface::Part part : {surface::Part::geometry, surface::Part::colour}) s.store.release(tile.key, part);
+  }
   return true;
 }
 

@@ -36,6 +36,7 @@ struct RendererOptions {
   geo::Ellipsoid ellipsoid;
   std::optional<Air> air = Air{};                         ///< nothing: FrameLook::atmosphere has no effect
   std::size_t gpu_budget_bytes = std::size_t{512} << 20;  ///< slots, meshes and targets together
+  bool overlays = false;                                  ///< whether tiles may have overlays
 };
 
 /// How a frame looks. All of it may change from frame to frame without a stall.

@@ -15,7 +15,10 @@ namespace {
 
 using surface::DrawTile;
 
-constexpr int kTileVectors = 8;  // u_tile of shaders/surface.vert
+/// What a tile adds to the features of all; bits of a variant's index.
+enum TileVariant : std::uint32_t { kFades = 1, kShines = 2, kOverlaid = 4 };
+
+constexpr int kTileVectors = 9;  // u_tile of shaders/surface.vert
 
 /// Hands triangles to a software rasteriser in portions: it draws some while the next are set up, and keeps some 280 bytes of
 /// each until it has drawn it, so that no more than a few portions may wait.
@@ -85,9 +88,9 @@ struct TileUniforms {
 gpu::ProgramSource surface_source() {
   return {shader_texts({"frame.glsl", "atmosphere.glsl", "surface.vert"}),
           shader_texts({"frame.glsl", "surface.frag"}),
-          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH", "EFFECTS"},
+          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH", "EFFECTS", "OVERLAY"},
           {"u_tile"},
-          {"u_colour", "u_slope", "u_before", "u_effects"},
+          {"u_colour", "u_slope", "u_before", "u_effects", "u_overlay"},
           {"Frame"}};
 }
 
@@ -116,9 +119,22 @@ SurfacePass::SurfacePass(gpu::RenderThread& thread)
 }
 
 Result<void> SurfacePass::prepare(gpu::RenderThread& thread, std::uint32_t features) {
-  const auto program = programs_.variant(thread, features);
-  if (!program) return program.error();
+  const auto programs = variants(thread, features);
+  if (!programs) return programs.error();
   return {};
+}
+
+Result<std::array<const gpu::LinkedProgram*, 8>> SurfacePass::variants(gpu::RenderThread& thread, std::uint32_t features) {
+  const bool coloured = !(features & (measure | wireframe)), overlaid = coloured && (features & overlay);
+  const bool shines = coloured && (features & light);  // effects matter to light only
+  std::array<const gpu::LinkedProgram*, 8> programs{};
+  for (std::uint32_t i = 0; i < programs.size(); ++i) {
+    const std::uint32_t added = (coloured && (i & kFades) ? fade : 0u) | (shines && (i & kShines) ? effects : 0u) | (overlaid && (i & kOverlaid) ? overlay : 0u);
+    const auto program = programs_.variant(thread, (features & ~overlay) | added);
+    if (!program) return program.error();
+    programs[i] = *program;
+  }
+  return programs;
 }
 
 void SurfacePass::set_anisotropy(const gpu::RenderThread& thread, double anisotropy) {
@@ -139,19 +155,11 @@ void SurfacePass::bind(unsigned unit, unsigned texture) {
 
 FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration,
                                const glm::dvec3& to_sun, std::uint32_t features, std::span<const DrawTile> tiles, const TileStore& store) {
-  // Of a tile at rest and of one that fades, each without and with effects; those matter to light only.
-  const bool coloured = !(features & (measure | wireframe)), shines = coloured && (features & light);
-  std::array<std::array<const gpu::LinkedProgram*, 2>, 2> programs{};
-  for (std::uint32_t fades = 0; fades < 2; ++fades) {
-    for (std::uint32_t with = 0; with < 2; ++with) {
-      const auto program = programs_.variant(thread, features | (coloured ? fades * fade : 0u) | (shines ? with * effects : 0u));
-      if (!program) return {};
-      programs[fades][with] = *program;
-    }
-  }
+  const auto programs = variants(thread, features);
+  if (!programs) return {};
 
   glBindSampler(1, 0);
-  for (const unsigned unit : {0u, 2u, 3u}) glBindSampler(unit, colour_sampler_.name());
+  for (const unsigned unit : {0u, 2u, 3u, 4u}) glBindSampler(unit, colour_sampler_.name());
   std::fill(std::begin(bound_), std::end(bound_), 0u);
 
   FrameFigures figures;
@@ -167,7 +175,9 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     const bool renews = !fades && colour_owner && colour_owner->colour_before;
     const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
     const bool has_effects = colour_owner && shows_effects(*colour_owner, mesh.origin_up(), tile.key.level, offset, to_sun);
-    const gpu::LinkedProgram* program = programs[fades || renews ? 1 : 0][has_effects ? 1 : 0];
+    const bool has_overlay = colour_owner && colour_owner->overlay;
+    const gpu::LinkedProgram* program =
+        (*programs)[(fades || renews ? kFades : 0u) + (has_effects ? kShines : 0u) + (has_overlay ? kOverlaid : 0u)];
     if (program != in_use) {
       glUseProgram(program->program.name());
       in_use = program;
@@ -192,6 +202,12 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
       u.v[7].w = layer.layer;
       bind(3, layer.texture);
     }
+    u.v[8] = glm::vec4(0);
+    if (has_overlay) {
+      const auto layer = store.overlay_of(*colour_owner);
+      u.v[8].x = layer.layer;
+      bind(4, layer.texture);
+    }
     bind(0, colour.texture);
     bind(1, slopes.texture);
     if (fades || renews) {
@@ -213,7 +229,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     ++figures.draws;
   }
   glBindVertexArray(0);
-  for (GLuint unit = 0; unit < 4; ++unit) glBindSampler(unit, 0);
+  for (GLuint unit = 0; unit < 5; ++unit) glBindSampler(unit, 0);
   return figures;
 }
 

@@ -1,6 +1,7 @@
 // Draws the tiles of a cut: shaded, as lines, as boxes, or measured.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -20,14 +21,15 @@ namespace tellurion::render {
 class SurfacePass {
  public:
   /// What a variant of the surface's program does; bits of its features.
-  enum Feature : std::uint32_t { light = 1, atmosphere = 2, fade = 4, borders = 8, wireframe = 16, measure = 32, log_depth = 64, effects = 128 };
+  enum Feature : std::uint32_t { light = 1, atmosphere = 2, fade = 4, borders = 8, wireframe = 16, measure = 32, log_depth = 64, effects = 128, overlay = 256 };
 
   explicit SurfacePass(gpu::RenderThread& thread);
 
-  /// Compiles the variant. Errors: internal.
+  /// Compiles what draw() needs for the same features. Errors: internal.
   Result<void> prepare(gpu::RenderThread& thread, std::uint32_t features);
 
-  /// The frame's block must be bound and depth be set up.
+  /// The frame's block must be bound and depth be set up. `features` holds `overlay` where tiles may have one, never `effects` or
+  /// `fade`: each tile has its own of the three.
   /// `to_sun`: unit vector in Ecef axes, of use with `light` only.
   FrameFigures draw(gpu::RenderThread& thread, const view::Camera& camera, double exaggeration, const glm::dvec3& to_sun, std::uint32_t features,
                     std::span<const surface::DrawTile> tiles, const TileStore& store);
@@ -37,6 +39,8 @@ class SurfacePass {
   void set_anisotropy(const gpu::RenderThread& thread, double anisotropy);
 
  private:
+  /// The programs for `features`, by what tiles add to them (see TileVariant).
+  Result<std::array<const gpu::LinkedProgram*, 8>> variants(gpu::RenderThread& thread, std::uint32_t features);
   /// Binds a texture array unless it is bound.
   void bind(unsigned unit, unsigned texture);
 
@@ -46,7 +50,7 @@ class SurfacePass {
   gpu::Buffer box_edges_;
   gpu::Sampler colour_sampler_;
   float anisotropy_ = 1.0f;
-  unsigned bound_[4] = {};
+  unsigned bound_[5] = {};
 };
 
 }  // namespace tellurion::render

@@ -1,7 +1,9 @@
 #include "render/tile_store.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <utility>
 
 #include <epoxy/gl.h>
 
@@ -71,6 +73,8 @@ Result<void> TileStore::warm_up(gpu::RenderThread& thread) {
     patches[i].upper = glm::vec2(0.5f);
   }
   if (auto composed = compositor_.compose(thread, patches, pool, *slot, budget_); !composed) return composed;
+  for (surface::ImagePatch& patch : patches) patch.use = surface::ImageUse::grayscale;
+  if (auto composed = compositor_.compose(thread, patches, pool, *slot, budget_); !composed) return composed;
   for (std::size_t i = 0; i < patches.size(); ++i) patches[i].use = i % 2 == 0 ? surface::ImageUse::night : surface::ImageUse::water;
   return compositor_.compose_effects(thread, patches, pool, *slot, budget_);
 }
@@ -126,44 +130,53 @@ std::optional<Slot> TileStore::acquire_colour(gpu::RenderThread& thread) {
   return slot;
 }
 
+void TileStore::release_colour(std::optional<Slot>& slot) {
+  if (slot) colours_.release(*slot);
+  slot.reset();
+}
+
 Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::TileKey& key,
                                       const surface::TileImagery& imagery, bool fades) {
-  const Error full{ErrorCode::exhausted, "the GPU budget has no room for the colours of tile " + geo::to_string(key)};
-  const bool has_effects = !imagery.effects.empty();
   const auto known = tiles_.find(key);
-  std::optional<Slot> slot = known == tiles_.end() ? std::nullopt : known->second.colour;
-  std::optional<Slot> effects = known == tiles_.end() ? std::nullopt : known->second.effects;
-  std::optional<Slot> fresh_effects;
-  if (has_effects && !effects) {
-    effects = fresh_effects = acquire_colour(thread);
-    if (!effects) return full;
+  ResidentTile slots;  // the tile's, with what it lacks
+  if (known != tiles_.end()) {
+    slots.colour = known->second.colour;
+    slots.effects = known->second.effects;
+    slots.overlay = known->second.overlay;
   }
-  if (slot && fades && !known->second.colour_before) {
-    if (const auto fresh = colours_.acquire(thread, budget_)) {
-      known->second.colour_before = slot;
-      known->second.renewal = 0;
+  const std::array wanted{std::pair(&ResidentTile::colour, true), std::pair(&ResidentTile::effects, !imagery.effects.empty()),
+                          std::pair(&ResidentTile::overlay, !imagery.overlays.empty())};
+  std::vector<std::optional<Slot>*> fresh;
+  for (const auto& [slot, is_wanted] : wanted) {
+    if (!is_wanted || slots.*slot) continue;
+    slots.*slot = acquire_colour(thread);
+    if (!(slots.*slot)) {
+      for (std::optional<Slot>* one : fresh) release_colour(*one);
+      return {ErrorCode::exhausted, "the GPU budget has no room for the colours of tile " + geo::to_string(key)};
+    }
+    fresh.push_back(&(slots.*slot));
+  }
+  const bool is_new = known == tiles_.end() || !known->second.colour;
+  ResidentTile& tile = tiles_[key];
+  if (fades && !is_new && !tile.colour_before) {
+    if (const auto other = colours_.acquire(thread, budget_)) {
+      tile.colour_before = slots.colour;
+      tile.renewal = 0;
       if (std::ranges::find(renewed_, key) == renewed_.end()) renewed_.push_back(key);
-      slot = fresh;
+      slots.colour = other;
     }
   }
-  if (!slot) slot = acquire_colour(thread);
-  if (!slot) {
-    if (fresh_effects) colours_.release(*fresh_effects);
-    return full;
+  for (const auto& [slot, is_wanted] : wanted) {
+    if (!is_wanted) release_colour(slots.*slot);
+    tile.*slot = slots.*slot;
   }
-  if (effects && !has_effects) {
-    colours_.release(*effects);
-    effects.reset();
-  }
-  ResidentTile& tile = tiles_[key];
-  tile.colour = slot;
-  tile.effects = effects;
   const auto has = [&](surface::ImageUse use) { return std::ranges::find(imagery.effects, use, &surface::ImagePatch::use) != imagery.effects.end(); };
   tile.has_night = has(surface::ImageUse::night);
   tile.has_water = has(surface::ImageUse::water);
   bytes_uploaded_ += imagery.bytes();
-  auto composed = compositor_.compose(thread, imagery.patches, colours_, *slot, budget_);
-  if (composed && has_effects) composed = compositor_.compose_effects(thread, imagery.effects, colours_, *effects, budget_);
+  auto composed = compositor_.compose(thread, imagery.patches, colours_, *tile.colour, budget_);
+  if (composed && tile.effects) composed = compositor_.compose_effects(thread, imagery.effects, colours_, *tile.effects, budget_);
+  if (composed && tile.overlay) composed = compositor_.compose(thread, imagery.overlays, colours_, *tile.overlay, budget_);
   if (!composed) release(key, surface::Part::colour);
   return composed;
 }
@@ -175,8 +188,7 @@ void TileStore::advance_renewals(float share) {
     ResidentTile& tile = found->second;
     tile.renewal += share;
     if (tile.renewal < 1) return false;
-    colours_.release(*tile.colour_before);
-    tile.colour_before.reset();
+    release_colour(tile.colour_before);
     return true;
   });
 }
@@ -190,10 +202,7 @@ void TileStore::release(const geo::TileKey& key, surface::Part part) {
     if (tile.slopes) slopes_.release(*tile.slopes);
     tile.slopes.reset();
   } else {
-    for (auto* slot : {&tile.colour, &tile.colour_before, &tile.effects}) {
-      if (*slot) colours_.release(**slot);
-      slot->reset();
-    }
+    for (auto* slot : {&tile.colour, &tile.colour_before, &tile.effects, &tile.overlay}) release_colour(*slot);
   }
   if (!tile.mesh && !tile.colour) tiles_.erase(found);
 }
@@ -205,11 +214,11 @@ const ResidentTile* TileStore::find(const geo::TileKey& key) const {
 
 TileStore::Layer TileStore::colour_of(const ResidentTile* tile) const {
   if (!tile || !tile->colour) return {no_colour_.name(), 0};
-  return {colours_.texture(*tile->colour), static_cast<float>(tile->colour->layer)};
+  return layer_of(*tile->colour);
 }
 
 TileStore::Layer TileStore::colour_before_of(const ResidentTile& tile) const {
-  return {colours_.texture(*tile.colour_before), static_cast<float>(tile.colour_before->layer)};
+  return layer_of(*tile.colour_before);
 }
 
 TileStore::Layer TileStore::slopes_of(const ResidentTile* tile) const {

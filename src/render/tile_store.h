@@ -24,7 +24,8 @@ struct ResidentTile {
   std::optional<Slot> colour_before;  ///< what `colour` replaces, until it has faded in
   float renewal = 1.0f;               ///< share of `colour` over it
   std::optional<Slot> effects;        ///< light by night (red, green, blue) and share of water (alpha), where `colour` is
-  bool has_night = false;             ///< the one of them is not dark all over
+  std::optional<Slot> overlay;        ///< what lies over light and air, likewise
+  bool has_night = false;             ///< the one of the effects is not dark all over
   bool has_water = false;
 };
 
@@ -58,7 +59,8 @@ class TileStore {
   Layer colour_of(const ResidentTile* tile) const;
   Layer colour_before_of(const ResidentTile& tile) const;
   /// Of a tile that has such a slot.
-  Layer effects_of(const ResidentTile& tile) const { return {colours_.texture(*tile.effects), static_cast<float>(tile.effects->layer)}; }
+  Layer effects_of(const ResidentTile& tile) const { return layer_of(*tile.effects); }
+  Layer overlay_of(const ResidentTile& tile) const { return layer_of(*tile.overlay); }
   Layer slopes_of(const ResidentTile* tile) const;
 
   Budget& budget() { return budget_; }
@@ -67,9 +69,11 @@ class TileStore {
   std::size_t colour_slots_free() const { return colours_.free_slots(budget_); }
 
  private:
+  Layer layer_of(Slot colour) const { return {colours_.texture(colour), static_cast<float>(colour.layer)}; }
   /// Slot arrays that nothing uses give way.
   bool has_room(std::size_t bytes);
   std::optional<Slot> acquire_colour(gpu::RenderThread& thread);
+  void release_colour(std::optional<Slot>& slot);
   void upload_slopes(Slot slot, const surface::SlopeMap& map);
 
   Budget budget_;

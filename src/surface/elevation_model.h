@@ -39,7 +39,7 @@ inline constexpr int kCoarsestFill = 6;
 struct SurfaceDescription {
   geo::Ellipsoid ellipsoid;
   std::vector<Layer> heights;
-  std::vector<Layer> colours;   ///< of every use; each covers those of its own use only
+  std::vector<Layer> colours;   ///< of every use; each covers those of its own use only, and colour those of grayscale
   std::uint64_t revision = 0;
 };
 

@@ -146,6 +146,24 @@ bool is_dark(const raster::Image& image) {
   return true;
 }
 
+bool is_clear(const raster::Image& image) {
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
+    if (image.rgba[i] != 0) return false;
+  }
+  return true;
+}
+
+std::vector<ImagePatch>& list_of(ImageUse use, TileImagery& imagery) {
+  switch (use) {
+    case ImageUse::colour:
+    case ImageUse::grayscale: return imagery.patches;
+    case ImageUse::night:
+    case ImageUse::water: return imagery.effects;
+    case ImageUse::overlay: break;
+  }
+  return imagery.overlays;
+}
+
 /// Leaves out the patches of a use all of which are dark.
 void drop_dark(std::vector<ImagePatch>& effects) {
   for (const ImageUse use : {ImageUse::night, ImageUse::water}) {
@@ -288,11 +306,12 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
   std::vector<ImagePatch> from_the_top;
   std::vector<MissingLayer> missing;
   std::array<bool, kImageUses> hidden{};  // what lies further down, of each use
+  const bool& colours_hidden = hidden[static_cast<std::size_t>(ImageUse::colour)];
   bool pending = false;
   for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
     const Layer& settings = *layer->settings;
     bool& hidden_below = hidden[static_cast<std::size_t>(settings.use)];
-    if (hidden_below || !settings.source->coverage().touches(key)) continue;
+    if (hidden_below || (settings.use == ImageUse::grayscale && colours_hidden) || !settings.source->coverage().touches(key)) continue;
     source::RasterReader& reader = layer->raster.reader();
     const SlotMapping mapping = map_slot(model.description().ellipsoid, key, layer->raster.description(), reader);
     const ClosedSides closed = closed_sides(layer->raster.description(), reader);
@@ -325,8 +344,9 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
   }
   if (pending) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
   TileImagery imagery;
-  for (ImagePatch& patch : std::views::reverse(from_the_top)) (patch.use == ImageUse::colour ? imagery.patches : imagery.effects).push_back(std::move(patch));
+  for (ImagePatch& patch : std::views::reverse(from_the_top)) list_of(patch.use, imagery).push_back(std::move(patch));
   drop_dark(imagery.effects);
+  std::erase_if(imagery.overlays, [](const ImagePatch& patch) { return is_clear(patch.image); });
   imagery.missing = std::move(missing);
   return imagery;
 }

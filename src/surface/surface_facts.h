@@ -17,6 +17,7 @@ struct TileFacts {
                                       ///< of themselves and of their descendants (Outlook)
   bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
   bool own_effects = false;           ///< and another one, for night and water
+  bool own_overlay = false;           ///< and one for what lies over the light
   bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels
 };

@@ -51,9 +51,13 @@ class MadeFacts final : public SurfaceFacts {
     const double finest_colour = finest_spacing(description_->colours, key);
     const double colour_texel = nominal_colour_texel(ellipsoid, key.level);
     facts.own_colour = key.level == 0 || finest_colour < kClearlyFiner * 2.0 * colour_texel;
-    facts.own_effects = facts.own_colour && std::ranges::any_of(description_->colours, [&](const Layer& layer) {
-      return layer.enabled && layer.use != ImageUse::colour && layer.source->coverage().touches(key);
-    });
+    const auto has_any_of = [&](std::initializer_list<ImageUse> uses) {
+      return facts.own_colour && std::ranges::any_of(description_->colours, [&](const Layer& layer) {
+               return layer.enabled && std::ranges::find(uses, layer.use) != uses.end() && layer.source->coverage().touches(key);
+             });
+    };
+    facts.own_effects = has_any_of({ImageUse::night, ImageUse::water});
+    facts.own_overlay = has_any_of({ImageUse::overlay});
     facts.finer_colour_below = finest_colour < kClearlyFiner * colour_texel;
     facts.own_slopes = key.level == 0 || finest_height < kClearlyFiner * 2.0 * nominal_slope_texel(ellipsoid, key.level);
     return facts;

@@ -110,9 +110,10 @@ struct TileGeometry {
   TileMetrics metrics;
 };
 
-/// What an image layer tells of the ground: its colour by day, the light that it gives by night, or where there is water.
-enum class ImageUse : std::uint8_t { colour, night, water };
-inline constexpr std::size_t kImageUses = 3;
+/// What an image layer tells of the ground: its colour by day; its brightness, which takes the place of the colours' own; the light
+/// that it gives by night; where there is water; or something that lies over ground and air and that no light changes.
+enum class ImageUse : std::uint8_t { colour, grayscale, night, water, overlay };
+inline constexpr std::size_t kImageUses = 5;
 
 /// A piece of a source image to be drawn into a tile's colour slot, lowest layer first.
 /// The control points form a grid of (columns + 1) x (rows + 1) over the slot's tile coordinates from `lower` to `upper`.
@@ -138,13 +139,14 @@ struct MissingLayer {
 };
 
 struct TileImagery {
-  std::vector<ImagePatch> patches;   ///< of colour
+  std::vector<ImagePatch> patches;   ///< of colour and grayscale
   /// Of night and water, for a slot of their own. None of a use of which the tile has nothing: neither light nor water.
   std::vector<ImagePatch> effects;
+  std::vector<ImagePatch> overlays;  ///< for one more slot
   std::vector<MissingLayer> missing;
   std::size_t bytes() const {
     std::size_t sum = 0;
-    for (const auto* list : {&patches, &effects}) {
+    for (const auto* list : {&patches, &effects, &overlays}) {
       for (const ImagePatch& p : *list) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);
     }
     return sum;

@@ -80,14 +80,17 @@ class Case(unittest.TestCase):
         return out
 
     def world(self, name, *layers, planet="Earth"):
-        """Writes a world file of layers (group, file[, more keys of the source]); files are those of the shared data."""
+        """Writes a world file of layers (group, file[, more keys of the source[, more of the layer]]); files are those of the
+        shared data."""
         lines = ["[planet]", f"name = {json.dumps(planet)}"]
         for group, path, *more in layers:
-            source = {"type": "gdal", "path": str(shared(path))} | (more[0] if more else {})
+            of_source, of_layer = (*more, {}, {})[:2]
+            source = {"type": "gdal", "path": str(shared(path))} | of_source
             if group == "height":
                 source.setdefault("vertical", "ellipsoid")
             keys = ", ".join(f"{key} = {json.dumps(value)}" for key, value in source.items())
             lines += ["", "[[layer]]", f'group = "{group}"', f"source = {{ {keys} }}"]
+            lines += [f"{key} = {json.dumps(value)}" for key, value in of_layer.items()]
         file = self.folder / f"{name}.toml"
         file.write_text("\n".join(lines) + "\n")
         return file

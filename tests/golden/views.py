@@ -32,6 +32,7 @@ MOON = [("height", "moon/lola_ldem4_4ppd_scale0.5.tif"), ("color", "moon/moon_4k
 POLAR = [("height", ETOPO5), ("height", ARCTIC), ("color", BLUE_MARBLE)]
 OVERLAPPING = [*EARTH, ("color", "earth/regional/mosaic_cog1.tif"), ("color", "earth/regional/mosaic_cog2.tif")]
 LIGHTS = [*EARTH, ("night", "earth/imagery/night_lights_4096.jpg"), ("water", "earth/imagery/water_mask_1600.png")]
+CLOUDS = [*EARTH, ("grayscale", "earth/imagery/water_mask_1600.png", {}, {"opacity": 0.3}), ("overlay", "earth/imagery/clouds_4096.png")]
 CITY = [*EARTH, ("color", "earth/regional/boston-inset.tif")]
 
 # name: layers, camera, more options
@@ -52,6 +53,8 @@ VIEWS = {
     "exaggeration": (EARTH, (22.0, 84.0, 600e3, 0.0, -25.0), ["--exaggeration", 20]),
     "night": (LIGHTS, (35.0, 10.0, 6e6), ["--time", "2024-12-21T17:00:00Z"]),
     "sun_in_the_sea": (LIGHTS, (5.0, -30.0, 1.2e7), ["--time", "2024-06-20T13:30:00Z"]),
+    "brightness_and_overlay": (CLOUDS, (20.0, 60.0, 9e6), ["--time", "2024-03-20T03:00:00Z"]),
+    "sunset_in_the_sea": (LIGHTS, (38.0, 15.0, 60e3, 290.0, -12.0), ["--time", "2024-06-20T17:40:00Z"]),
     "wireframe": (MOUNTAINS, (46.70, -121.76, 6500, 0, -10), ["--wireframe"]),
     "rainier": (MOUNTAINS, (46.70, -121.76, 6500, 0, -10), []),
     "rainier_plain": (MOUNTAINS, (46.95, -121.95, 9000, 135, -30), ["--no-lighting", "--no-atmosphere", "--clear", "404040"]),

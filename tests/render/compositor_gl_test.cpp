@@ -311,3 +311,32 @@ TEST_CASE("compose_effects: light by night in red, green and blue, water in alph
     CHECK(near(texel(bench.compose_effects({sea}), 230, 100), {0, 0, 0, 0}, 0));
   }
 }
+
+TEST_CASE("compose: grayscale becomes the V of HSV of what lies below it, by its opacity and where it is") {
+  for (const gpu::Api api : {gpu::Api::core, gpu::Api::es}) {
+    Bench bench(api);
+    const auto ground = plain_patch({200, 100, 50, 255}, true, kAllLower, {0.75f, 1.1f});
+    const auto lake = plain_patch({0, 0, 0, 255}, true, kAllLower, {0.25f, 1.1f});
+    auto relief = plain_patch({100, 100, 100, 255}, true, kAllLower, kAllUpper);
+    relief.use = surface::ImageUse::grayscale;
+    const auto texels = bench.compose({ground, lake, relief});
+    CHECK(near(texel(texels, 128, 100), {100, 50, 25, 255}, 1));    // hue 20 degrees and saturation 0.75 stay
+    CHECK(near(texel(texels, 20, 100), {100, 100, 100, 255}, 1));   // black has no hue
+    CHECK(near(texel(texels, 230, 100), {100, 100, 100, 255}, 1));  // nor has nothing
+    relief.opacity = 0.5f;
+    CHECK(near(texel(bench.compose({ground, relief}), 128, 100), {150, 75, 38, 255}, 1));
+    CHECK(near(texel(bench.compose({ground, relief}), 230, 100), {50, 50, 50, 128}, 1));
+    relief.opacity = 1.0f;
+    relief.gamma = 2.0f;
+    relief.multiplier = 2.0f;
+    CHECK(near(texel(bench.compose({ground, relief}), 128, 100), {78, 39, 20, 255}, 1));  // 2 * 100^2 / 255
+    relief.gamma = relief.multiplier = 1.0f;
+    relief.opaque = false;
+    relief.image.rgba = {50, 50, 50, 128};
+    CHECK(near(texel(bench.compose({ground, relief}), 128, 100), {150, 75, 38, 255}, 1));
+    const auto half_there = plain_patch({100, 50, 25, 128}, false, kAllLower, kAllUpper);
+    relief.opaque = true;
+    relief.image.rgba = {100, 100, 100, 255};
+    CHECK(near(texel(bench.compose({half_there, relief}), 128, 100), {100, 75, 62, 255}, 1));  // tinted by half
+  }
+}

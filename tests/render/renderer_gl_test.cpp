@@ -211,6 +211,39 @@ TEST_CASE("picture: lights of the night show in the dark only, water mirrors the
   CHECK(shown(kLamp, kSea, kMidnight, false) == shown(kDark, kDark, kMidnight, false));
 }
 
+TEST_CASE("picture: an overlay lies over ground and night alike, and light changes nothing of it") {
+  const geo::TileKey key{0, 6, 32, 32};
+  for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
+    Stage stage(api, without, {.ellipsoid = geo::kWgs84, .air = std::nullopt, .overlays = true});
+    REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, exact_geometry(geo::kWgs84, key, flat)).has_value());
+    const auto shown = [&](std::array<std::uint8_t, 4> overlay, double sun_from_zenith, bool night_too = false) {
+      auto imagery = exact_imagery(key, [](const auto&) { return glm::dvec3(0.2); });
+      auto patch = imagery.patches.front();
+      patch.opaque = overlay[3] == 255;
+      patch.image = {1, 1, {overlay.begin(), overlay.end()}};
+      if (overlay[3] != 0) imagery.overlays = {patch};
+      patch.use = surface::ImageUse::night;
+      if (night_too) imagery.effects = {patch};
+      REQUIRE(stage.renderer->upload_colour(*stage.thread, key, imagery).has_value());
+      const DrawTile tile = draw_alone(key);
+      FrameLook look;
+      look.to_sun = geo::enu_at(geo::kWgs84, {})(geo::Vector<geo::Enu>{glm::dvec3(std::sin(sun_from_zenith), 0.0, std::cos(sun_from_zenith))});
+      return pixel(stage.picture(camera_at("-0.5,0.5,50000"), look, {&tile, 1}), kWidth / 2, kHeight / 2);
+    };
+    constexpr std::array<std::uint8_t, 4> kNothing{0, 0, 0, 0}, kSign{40, 150, 220, 255}, kHalf{20, 75, 110, 128};
+    constexpr double kMorning = 1.0, kMidnight = 3.0;
+    for (const double sun : {kMorning, kMidnight}) {
+      for (const bool night_too : {false, true}) {
+        const auto sign = shown(kSign, sun, night_too);
+        for (int c = 0; c < 3; ++c) CHECK(std::abs(int{sign[c]} - int{kSign[c]}) <= 1);
+      }
+      const auto plain = shown(kNothing, sun), half = shown(kHalf, sun);
+      for (int c = 0; c < 3; ++c) CHECK(std::abs(half[c] - (kHalf[c] + plain[c] * 127 / 255)) <= 1);
+    }
+    CHECK(shown(kNothing, kMorning) != shown(kNothing, kMidnight));
+  }
+}
+
 TEST_CASE("measure: heights, places and distances agree with the analytic ellipsoid") {
   struct View {
     const char* pose;

@@ -318,6 +318,26 @@ TEST_CASE("build_imagery: layers of night and water are effects, and hide only t
   CHECK(imagery.bytes() > 2 * imagery.patches[0].image.bytes());
 }
 
+TEST_CASE("build_imagery: grayscale hides no colours, what lies over it hides both, and overlays are a list of their own") {
+  MadeRaster white = normals_picture(512), clear = normals_picture(512);
+  clear.colour = [](int, int) { return std::array<std::uint8_t, 4>{}; };
+  Layer ground = layer_of(white, 1), relief = layer_of(white, 2), more_relief = layer_of(white, 3), sign = layer_of(white, 4);
+  const Layer top = layer_of(white, 5);
+  relief.use = more_relief.use = ImageUse::grayscale;
+  sign.use = ImageUse::overlay;
+  const TileImagery shown = Pictures({ground, relief, more_relief, sign}).of({0, 2, 1, 1});
+  REQUIRE(shown.patches.size() == 2);
+  CHECK(shown.patches[0].use == ImageUse::colour);
+  CHECK(shown.patches[1].use == ImageUse::grayscale);
+  CHECK(shown.overlays.size() == 1);
+  CHECK(shown.effects.empty());
+  CHECK(shown.bytes() > 3 * shown.patches[0].image.bytes());
+  CHECK(Pictures({ground, relief, top}).of({0, 2, 1, 1}).patches.size() == 1);
+  Layer nothing = layer_of(clear, 6);
+  nothing.use = ImageUse::overlay;
+  CHECK(Pictures({ground, nothing}).of({0, 2, 1, 1}).overlays.empty());
+}
+
 TEST_CASE("build_imagery: a layer that cannot be read is named, and the others are there, those below it too") {
   MadeRaster white = normals_picture(512), broken = normals_picture(512);
   broken.broken = true;
