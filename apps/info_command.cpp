@@ -1,6 +1,13 @@
 // tellurion info: what is in a world or a data set.
 #include "commands.h"
 
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <numbers>
+#include <vector>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,10 +19,31 @@ namespace {
 
 std::string angle(Radians value) { return fmt::format("{:.6f}", to_degrees(value).value); }
 
+constexpr double kManySamples = 25e6;
+
+/// Of the samples, or why there are none.
+void print_statistics(const globe::LayerInfo& layer, bool exact) {
+  const auto statistics = globe::statistics_of(layer, exact ? INFINITY : kManySamples);
+  if (!statistics) {
+    fmt::print("  samples     {}\n", statistics.error().message);
+    return;
+  }
+  constexpr const char* kColours[] = {"red", "green", "blue"};
+  const bool is_height = layer.raster->description().kind == source::SampleKind::height;
+  for (std::size_t i = 0; i < statistics->bands.size(); ++i) {
+    const source::BandStatistics& band = statistics->bands[i];
+    fmt::print("  {:<11} {:.6g} .. {:.6g}{}, mean {:.6g}, standard deviation {:.6g}\n", is_height ? "samples" : statistics->bands.size() > 1 ? kColours[i] : "grey",
+               band.least, band.largest, is_height ? " m" : "", band.mean, band.deviation);
+  }
+  const std::string of_level = statistics->level == 0 ? "" : fmt::format(" (all of this of level {}; --exact reads level 0)", statistics->level);
+  fmt::print("  there       {:.4g} % of the samples{}\n", 100.0 * statistics->share_there, of_level);
+}
+
 void print_raster(const source::RasterDescription& raster) {
   fmt::print("  file        {}\n", raster.name);
   fmt::print("  size        {} x {} samples, {} band{} of {}\n", raster.levels.front().width, raster.levels.front().height,
              raster.band_count, raster.band_count == 1 ? "" : "s", raster.sample_type);
+  if (!raster.encoding.empty()) fmt::print("  encoding    {}\n", raster.encoding);
   std::vector<std::string> levels;
   for (const auto& level : raster.levels) levels.push_back(fmt::format("{}x{}", level.width, level.height));
   fmt::print("  levels      {}\n", fmt::join(levels, " "));
@@ -30,9 +58,44 @@ void print_raster(const source::RasterDescription& raster) {
     fmt::print("  heights     above {}{}\n", raster.vertical, raster.vertical_declared ? "" : " (not declared: taken as such)");
 }
 
-int info(const Options& options) {
+struct InfoOptions : Options {
+  std::filesystem::path picture;
+  bool exact = false;
+};
+
+/// Over the whole globe as it is by day, each raster that does not go round it.
+Result<void> draw_picture(const InfoOptions& options, globe::World world, const std::vector<globe::LayerInfo>& told) {
+  auto footprints = globe::with_footprints(std::move(world), told);
+  if (!footprints) return footprints.error();
+  globe::GlobeOptions globe_options;
+  globe_options.scan_heights = false;
+  const auto globe = globe::Globe::open(std::move(footprints->world), globe_options);
+  if (!globe) return globe.error();
+  auto thread = gpu::RenderThread::headless(options.api);
+  if (!thread) return thread.error();
+  const auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
+  if (!view) return view.error();
+  constexpr double kHeight = 1.9;  // radii of the body: all of it in 45 degrees
+  constexpr int kSide = 800;
+  constexpr Degrees kFieldOfView{45.0};
+  view::Pose pose;
+  const geo::LatLon below = footprints->middle.value_or(geo::LatLon{});
+  pose.position = {below.latitude, below.longitude, EllipsoidalHeight(kHeight * (*globe)->ellipsoid().a())};
+  pose.pitch = Radians(-std::numbers::pi / 2.0);
+  globe::ViewSettings settings;
+  settings.lighting = false;
+  settings.sse_px = 2.0;  // of what lies on the data, little is wanted
+  const auto camera = view::make_camera((*globe)->ellipsoid(), pose, to_radians(kFieldOfView), kSide, kSide);
+  const bool is_complete = (*view)->finish(camera, settings, std::chrono::steady_clock::now() + std::chrono::minutes(2));
+  if (const auto written = globe::write_png(options.picture, (*view)->picture(camera, settings)); !written) return written;
+  if (!is_complete) fmt::print(stderr, "tellurion: {} is written, but it is not complete\n", options.picture.string());
+  return {};
+}
+
+int info(const InfoOptions& options) {
   auto world = globe::resolve_world(options.world);
   if (!world) return report(world.error());
+  const globe::World shown = *world;
   // A raster is told for itself, without what it would be shown over.
   if (world->file.empty()) world->layers.erase(world->layers.begin(), world->layers.end() - 1);
   globe::GlobeOptions globe_options;
@@ -44,20 +107,29 @@ int info(const Options& options) {
   fmt::print("planet {}: {:.3f} x {:.3f} m\n", w.planet, w.ellipsoid.a(), w.ellipsoid.b());
   for (const globe::LayerInfo& layer : (*globe)->layers()) {
     fmt::print("layer {} ({}){}\n", layer.spec.name, name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
-    if (layer.raster) print_raster(layer.raster->description());
-    else fmt::print("  file        {}\n", layer.spec.source.url.empty() ? layer.spec.source.path.string() : fetch::without_credentials(layer.spec.source.url));
+    if (layer.raster) {
+      print_raster(layer.raster->description());
+      print_statistics(layer, options.exact);
+    } else {
+      fmt::print("  file        {}\n", layer.spec.source.url.empty() ? layer.spec.source.path.string() : fetch::without_credentials(layer.spec.source.url));
+    }
     if (!layer.error.empty()) fmt::print("  error       {}\n", layer.error);
   }
   for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
+  if (!options.picture.empty()) {
+    if (const auto drawn = draw_picture(options, shown, (*globe)->layers()); !drawn) return report(drawn.error());
+  }
   return (*globe)->data_missing() ? kDataMissing : kDone;
 }
 
 }  // namespace
 
 void add_info(CLI::App& app, Run& run) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "what is in a world file or a raster");
   add_world(*command, *options, false);
+  command->add_flag("--exact", options->exact, "statistics of all samples, however many");
+  command->add_option("--picture", options->picture, "also draw where it lies on the globe")->check(has_ending(".png"))->type_name("FILE.png");
   command->callback([options, &run] { run = [options] { return info(*options); }; });
 }
 

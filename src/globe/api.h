@@ -8,6 +8,7 @@
 #include "globe/globe.h"
 #include "globe/globe_view.h"
 #include "globe/kept_files.h"
+#include "globe/layer_facts.h"
 #include "globe/picture_file.h"
 #include "globe/prefetch.h"
 #include "globe/world.h"

@@ -209,7 +209,9 @@ void Globe::State::open_layers() {
     info.spec = spec;
     SourceStats stats;
     stats.name = spec.name;
-    if (spec.enabled && !spec.source.time) {
+    if (spec.source.raster) {
+      info.raster = spec.source.raster;
+    } else if (spec.enabled && !spec.source.time) {
       auto source = open_source(spec);
       if (source) {
         info.raster = std::move(*source);

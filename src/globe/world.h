@@ -5,6 +5,7 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,10 @@
 #include "base/result.h"
 #include "geo/ellipsoid.h"
 #include "source/temporal/time_steps.h"
+
+namespace tellurion::source {
+class RasterSource;
+}
 
 namespace tellurion::globe {
 
@@ -62,6 +67,8 @@ struct SourceSpec {
   int max_level = 18;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees; of type "image" too
   std::string table;                        ///< of a GeoPackage; empty: the only one
+
+  std::shared_ptr<const source::RasterSource> raster;  ///< what an embedding program draws or reads itself: instead of all above
 
   ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like
 

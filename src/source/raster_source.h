@@ -46,6 +46,7 @@ struct RasterDescription {
   bool wraps = false;              ///< columns go round the body: column `width` is column 0 again
   int band_count = 0;
   std::string sample_type;         ///< "Int16", "Byte", ...
+  std::string encoding;            ///< how a file keeps its samples, for people: format, compression, blocks, no-data, scale; may be empty
   std::string crs_name;            ///< e.g. "WGS 84 / UTM zone 18N"
   std::string crs_wkt;
   geo::Ellipsoid ellipsoid;        ///< of the raster's own CRS

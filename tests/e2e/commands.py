@@ -343,6 +343,27 @@ class Info(CommandCase):
             for word in words:
                 self.assertIn(word, told)
 
+    def test_statistics_are_those_of_the_samples(self):
+        told = self.tellurion("info", shared(RAINIER)).stdout
+        samples = gdal.Open(str(shared(RAINIER))).ReadAsArray().astype(float)
+        there = samples[samples != -32768]
+        for number in (f"{there.min():g} .. {there.max():g} m", f"mean {there.mean():.6g}", f"deviation {there.std():.6g}",
+                       f"{100 * there.size / samples.size:.4g} % of the samples", "no-data -32768"):
+            self.assertIn(number, told)
+
+    def test_a_picture_of_where_it_lies(self):
+        out = self.folder / "where.png"
+        self.tellurion("info", shared("earth/regional/antarctica_etopo5_epsg3031_10km.tif"), "--picture", out)
+        picture = read_picture(out).astype(int)
+        yellow = (picture[..., 0] > 180) & (picture[..., 1] > 130) & (picture[..., 2] < 60)
+        # The raster's corners are 52.3 degrees south: a square with the pole in the middle, half as wide as the picture.
+        rows, columns = np.nonzero(yellow)
+        for low, high in ((rows.min(), rows.max()), (columns.min(), columns.max())):
+            self.assertAlmostEqual((low + high) / 2, 399.5, delta=3)
+            self.assertTrue(400 < high - low < 480, f"{low} to {high}")
+        nowhere = self.folder / "no/such/folder.png"
+        self.assertIn(str(nowhere), self.tellurion("info", shared(BLUE_MARBLE), "--picture", nowhere, status=1).stderr)
+
     def test_of_what_is_not_there(self):
         self.refused("info", self.folder / "none.tif", naming="none.tif")
         self.refused("info", self.folder / "none.toml", naming="none.toml")

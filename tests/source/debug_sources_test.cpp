@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include "source/debug/block_letters.h"
+#include "source/debug/footprint.h"
 #include "source/debug/scale_reference.h"
 #include "source/debug/tile_index.h"
 #include "source/gdal/gdal_source.h"
@@ -212,6 +213,44 @@ TEST_CASE("image: a picture without a georeference lies over the bounds that are
   const Opened globe = opened(open_gdal(options, geo::kMoon));
   CHECK(globe.source->description().wraps);
   CHECK(pixel_of(*globe.reader, 90.0, -180.0) == glm::dvec2(0.0));
+}
+
+TEST_CASE("footprint: tints the raster's ground in its own projection, with a line along its border; a ring shows where a small one lies") {
+  test::MadeRaster raster;
+  raster.width = raster.height = 600;
+  raster.crs = "EPSG:3031";
+  raster.transform = {-3e6, 1e4, 0.0, 3e6, 0.0, -1e4};
+  raster.values = {std::vector<double>(360000, 1.0)};
+  const test::MadeFile file("polar_square.tif", raster);
+  GdalOptions options;
+  options.path = file.path();
+  std::shared_ptr<const RasterSource> square = *open_gdal(options, geo::kWgs84);
+  CHECK(to_degrees(middle_of(*square).latitude).value == doctest::Approx(-90.0));
+  const Opened footprint = opened(open_footprint(square, geo::kWgs84));
+  const auto ink = [](const Opened& drawn, double latitude, double longitude) {
+    const glm::dvec2 at = pixel_of(*drawn.reader, latitude, longitude);
+    const auto pixel = drawn.reader->read_colours(0, {static_cast<int>(at.x), static_cast<int>(at.y), 1, 1});
+    REQUIRE(pixel);
+    return pixel->at(0, 0)[3];
+  };
+  // By the polar stereographic formula of EPSG:3031 (true at 71 S): y = 3,000 km on longitude 0 is 62.82 S; a corner lies
+  // sqrt(2) farther from the pole, 52.3 S.
+  CHECK(ink(footprint, -63.2, 0.0) == 80);
+  CHECK(ink(footprint, -62.4, 0.0) == 0);
+  CHECK(ink(footprint, -54.0, 45.0) == 80);
+  CHECK(ink(footprint, -89.0, 170.0) == 80);
+  CHECK(ink(footprint, 40.0, 0.0) == 0);
+  bool has_line = false;
+  for (double latitude = -63.2; latitude < -62.4; latitude += 0.005) has_line = has_line || ink(footprint, latitude, 0.0) == 255;
+  CHECK(has_line);
+
+  raster.transform = {10.0, 1e-5, 0.0, 50.0, 0.0, -1e-5};
+  raster.crs = "EPSG:4326";
+  const test::MadeFile field("field.tif", raster);
+  options.path = field.path();
+  const Opened small = opened(open_footprint(std::shared_ptr<const RasterSource>(*open_gdal(options, geo::kWgs84)), geo::kWgs84));
+  CHECK(ink(small, 50.0 + 0.08 * 180.0 / std::numbers::pi, 10.0) == 255);
+  CHECK(ink(small, 51.0, 10.0) == 0);
 }
 
 TEST_CASE("debug sources: what cannot be is refused") {

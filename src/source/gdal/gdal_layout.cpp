@@ -254,6 +254,21 @@ std::string revision_of(GDALDataset& dataset, const GdalOptions& options) {
   return text;
 }
 
+/// In words.
+std::string encoding_of(GDALDataset& dataset, const GdalOptions& options) {
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  std::string text = dataset.GetDriverName();
+  const char* compression = dataset.GetMetadataItem("COMPRESSION", "IMAGE_STRUCTURE");
+  if (compression != nullptr) text += fmt::format(", {}", compression);
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  text += fmt::format(", blocks of {} x {}", width, height);
+  if (const auto no_data = no_data_of(band, options)) text += fmt::format(", no-data {}", *no_data);
+  const double scale = options.scale.value_or(band.GetScale()), offset = options.offset.value_or(band.GetOffset());
+  if (scale != 1.0 || offset != 0.0) text += fmt::format(", scale {}, offset {}", scale, offset);
+  return text;
+}
+
 }  // namespace
 
 Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, const geo::Ellipsoid& world) {
@@ -273,6 +288,7 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
   }
   const GDALDataType type = dataset.GetRasterBand(1)->GetRasterDataType();
   about.sample_type = GDALGetDataTypeName(type);
+  about.encoding = encoding_of(dataset, options);
   if (GDALDataTypeIsComplex(type)) return unsupported(options, fmt::format("has complex samples ({}); make them real first: gdal_calc.py", about.sample_type));
 
   Result<Georeference> georeference = find_georeference(dataset, options, world);

@@ -1,0 +1,26 @@
+// What a user may want to know of layers: what their samples are like, and where on the globe they lie.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/result.h"
+#include "geo/geodetic.h"
+#include "globe/globe.h"
+#include "source/statistics.h"
+
+namespace tellurion::globe {
+
+/// See source::statistics_of. Of a layer that has a raster.
+Result<source::RasterStatistics> statistics_of(const LayerInfo& layer, double most_samples);
+
+/// A world that also shows where layers lie.
+struct ShownFootprints {
+  World world;
+  std::optional<geo::LatLon> middle;  ///< of the last raster that does not go round the globe, or of any
+};
+
+/// Adds an overlay for each raster of `layers` that does not go round the globe.
+Result<ShownFootprints> with_footprints(World world, const std::vector<LayerInfo>& layers);
+
+}  // namespace tellurion::globe
