@@ -29,6 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPixelTolerance = 1e-3;  ///< pixels: grids that differ by less are the same
+constexpr double kWarpTolerance = 0.01;   ///< pixels of an input: GDAL's 0.125 are ten metres on a mountain of pixels of 90
 constexpr double kOwnVoid = -32768.0;     ///< where voids need a value and no input names one
 
 /// A rectangle in pixels of the output.
@@ -542,6 +543,7 @@ Result<void> warp(Input& input, const IngestOptions& options, const OutputPlan& 
     add("-dstnodata", plan.layout.no_data.value_or(kOwnVoid));
     add("-ot", GDALGetDataTypeName(gdal_type(plan.layout.type)));
   }
+  add("-et", kWarpTolerance);
   add("-wm", 16);
   // Else GDAL finds the size of its kernel anew for every piece that it reads, which shows at their borders.
   add("-wo", fmt::format("XSCALE={}", input.fineness));
