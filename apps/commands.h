@@ -15,6 +15,7 @@ void add_render(CLI::App& app, Run& run);
 void add_fly(CLI::App& app, Run& run);
 void add_height(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
+void add_ingest(CLI::App& app, Run& run);
 void add_cache(CLI::App& app, Run& run);
 /// Under `cache`.
 void add_prefetch(CLI::App& cache, Run& run);

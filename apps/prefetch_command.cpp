@@ -13,9 +13,9 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "flight_frames.h"
+#include "progress_line.h"
 
 namespace tellurion::apps {
 namespace {
@@ -44,38 +44,7 @@ void stop_on_interrupt() {
   });
 }
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 std::string megabytes(double bytes) { return fmt::format("{:.1f} MB", bytes / (1 << 20)); }
-
-std::string duration_text(double seconds) {
-  const auto whole = static_cast<std::int64_t>(seconds + 0.5);
-  return whole < 3600 ? fmt::format("{}:{:02}", whole / 60, whole % 60) : fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
-}
-
-/// A bar on a terminal, elsewhere a line every few seconds.
-class ProgressLine {
- public:
-  ProgressLine(std::int64_t count, const char* unit) : count_(count), unit_(unit) {}
-
-  void show(std::int64_t done, std::int64_t bytes, bool last = false) {
-    const bool terminal = isatty(STDERR_FILENO) != 0;
-    if (!last && !terminal && seconds_since(shown_) < 5.0) return;
-    shown_ = Clock::now();
-    const double seconds = std::max(seconds_since(start_), 1e-3), rate = static_cast<double>(done) / seconds;
-    std::string text = fmt::format("{} of {} {}, {:.0f}/s, {} at {}/s", done, count_, unit_, rate, megabytes(static_cast<double>(bytes)), megabytes(static_cast<double>(bytes) / seconds));
-    if (!last && rate > 0.0) text += fmt::format(", {} left", duration_text(static_cast<double>(count_ - done) / rate));
-    const auto filled = static_cast<std::size_t>(30 * done / std::max<std::int64_t>(count_, 1));
-    if (terminal) fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:<70}{}", "", filled, "", 30 - filled, text, last ? "\n" : "");
-    else fmt::print(stderr, "{}\n", text);
-  }
-
- private:
-  std::int64_t count_;
-  const char* unit_;
-  Clock::time_point start_ = Clock::now();
-  Clock::time_point shown_ = start_;
-};
 
 /// Whether there is a point in fetching more: what is not kept is of no use.
 bool may_go_on(const globe::Globe& globe) { return g_interrupted == 0 && globe.fetch_stats().not_kept < kMostNotKept; }
@@ -130,12 +99,12 @@ int prefetch_region(const PrefetchOptions& options, globe::Globe& globe) {
     return report({ErrorCode::exhausted, fmt::format("the tiles would not fit: --disk-cache {},{:.0f} makes room, a smaller region or coarser levels need less, "
                                                      "--anyway fetches them nevertheless", options.disk_cache.string(), std::ceil(1.2 * bytes / (1 << 20)))});
   }
-  ProgressLine line(count, "tiles");
+  ProgressLine line(static_cast<double>(count), "tiles");
   const auto progress = plan->run([&](const globe::PrefetchProgress& p) {
-    line.show(p.done + p.failed, globe.fetch_stats().bytes);
+    line.show(static_cast<double>(p.done + p.failed), static_cast<double>(globe.fetch_stats().bytes));
     return may_go_on(globe);
   });
-  line.show(progress.done + progress.failed, globe.fetch_stats().bytes, true);
+  line.show(static_cast<double>(progress.done + progress.failed), static_cast<double>(globe.fetch_stats().bytes), true);
   return ended(options.disk_cache, globe.fetch_stats().not_kept, progress.stopped, progress.done, count, count - progress.done, "tiles", progress.last_error);
 }
 
@@ -153,7 +122,7 @@ int prefetch_flight(const PrefetchOptions& options, globe::Globe& globe) {
   for (; frame < count && may_go_on(globe); ++frame) {
     const auto deadline = Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_seconds * 1e3));
     if (!(*view)->finish(frame_camera(*flight, frame, options, globe.ellipsoid()), frame_settings(frame, options), deadline)) ++incomplete;
-    line.show(frame + 1, globe.fetch_stats().bytes, frame + 1 == count);
+    line.show(frame + 1, static_cast<double>(globe.fetch_stats().bytes), frame + 1 == count);
   }
   std::string last_error;
   for (const auto& source : globe.source_stats()) {
