@@ -209,7 +209,7 @@ void Globe::State::open_layers() {
     info.spec = spec;
     SourceStats stats;
     stats.name = spec.name;
-    if (spec.source.raster) {
+    if (spec.enabled && spec.source.raster) {
       info.raster = spec.source.raster;
     } else if (spec.enabled && !spec.source.time) {
       auto source = open_source(spec);
