@@ -1,5 +1,8 @@
 #include "source/gdal/unpacked_copy.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <numeric>
@@ -11,6 +14,7 @@
 #include <unistd.h>
 
 #include "source/gdal/gdal_runtime.h"
+#include "source/gdal/gdal_source.h"
 #include "source/made_raster.h"
 
 using namespace tellurion;
@@ -83,4 +87,47 @@ TEST_CASE("unpacked_copy: a damaged copy is made again, and what cannot be writt
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == ErrorCode::unavailable);
   CHECK(refused.error().message.find((folder.path() / "file").string()) != std::string::npos);
+}
+
+TEST_CASE("unpacked_copy: every level of a progressive JPEG shows what lies there, though the copy lacks the overviews that GDAL finds in the JPEG") {
+  constexpr int kLarge[2] = {4608, 2560};  // large enough to be copied
+  const Folder folder;
+  const std::string file = (folder.path() / "large.jpg").string();
+  {
+    GDALDriver& memory = *GetGDALDriverManager()->GetDriverByName("MEM");
+    const GDALDatasetUniquePtr drawn(memory.Create("", kLarge[0], kLarge[1], 3, GDT_Byte, nullptr));
+    std::vector<std::uint8_t> row(static_cast<std::size_t>(kLarge[0]));
+    for (int band = 1; band <= 3; ++band) {
+      for (int y = 0; y < kLarge[1]; ++y) {
+        for (int x = 0; x < kLarge[0]; ++x) row[static_cast<std::size_t>(x)] = static_cast<std::uint8_t>(band == 1 ? x * 255 / kLarge[0] : band == 2 ? y * 255 / kLarge[1] : 128);
+        REQUIRE(drawn->GetRasterBand(band)->RasterIO(GF_Write, 0, y, kLarge[0], 1, row.data(), kLarge[0], 1, GDT_Byte, 0, 0, nullptr) == CE_None);
+      }
+    }
+    const char* const options[] = {"PROGRESSIVE=ON", "QUALITY=95", nullptr};
+    REQUIRE(GDALDatasetUniquePtr(GetGDALDriverManager()->GetDriverByName("JPEG")->CreateCopy(file.c_str(), drawn.get(), FALSE, const_cast<char**>(options), nullptr, nullptr)));
+  }
+  GdalOptions options;
+  options.path = file;
+  options.kind = SampleKind::colour;
+  options.bounds = {-180.0, -90.0, 180.0, 90.0};
+  options.unpack_folder = folder.path().string();
+  const auto source = open_gdal(options, geo::kWgs84);
+  REQUIRE(source);
+  const auto reader = (*source)->open_reader();
+  REQUIRE(reader);
+  const auto& levels = (*source)->description().levels;
+  REQUIRE(levels.size() > 3);
+  for (int level = 0; level < static_cast<int>(levels.size()); ++level) {
+    const LevelSize& size = levels[static_cast<std::size_t>(level)];
+    const PixelWindow window{size.width / 2, size.height / 2, size.width / 3, size.height / 3};
+    const auto image = (*reader)->read_colours(level, window);
+    REQUIRE(image);
+    for (const int step : {0, window.height / 2, window.height - 1}) {
+      const auto colour = image->at(step, step);
+      CAPTURE(level);
+      CHECK(std::abs(colour[0] - (window.x + step + 0.5) / size.width * 255.0) < 4.0);
+      CHECK(std::abs(colour[1] - (window.y + step + 0.5) / size.height * 255.0) < 4.0);
+    }
+  }
+  CHECK(std::ranges::any_of(fs::directory_iterator(folder.path()), [](const auto& entry) { return entry.path().extension() == ".tif"; }));
 }

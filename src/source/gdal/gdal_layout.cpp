@@ -306,26 +306,28 @@ Result<GdalLayout> inspect(GDALDataset& dataset, const GdalOptions& options, con
     bands = layout.colours.bands;
     if (layout.colours.alpha_band) bands.push_back(layout.colours.alpha_band);
   }
-  // Overviews were made with the file's own no-data value: another one has been averaged into them.
-  const bool own_voids = options.no_data && no_data_of(*dataset.GetRasterBand(1), GdalOptions{}) != options.no_data;
-  plan_levels(layout, size_of(*dataset.GetRasterBand(1)), own_voids ? std::vector<LevelSize>{} : overviews_of(dataset, bands));
   layout.revision = revision_of(dataset, options);
-  constexpr double kManySamples = 2e8;
-  if (static_cast<double>(layout.georeference.width) * layout.georeference.height > kManySamples && about.levels.size() > 1 && layout.levels[1].overview < 0) {
-    about.hints.push_back(fmt::format("{} is large and has no overviews, which makes it slow from afar: run gdaladdo on it once.", options.path));
-  }
+  GDALDatasetUniquePtr copied;  // what is read in the place of `dataset`, if anything is
   constexpr double kCoefficientBytes = 2.0, kManyBytes = 64e6;
   const double decoder_bytes = kCoefficientBytes * about.band_count * layout.georeference.width * layout.georeference.height;
   if (decoder_bytes > kManyBytes && is_progressive_jpeg(options.path)) {
     const Result<std::string> copy = options.unpack_folder.empty() ? Error{ErrorCode::unavailable, "there is no cache folder for a copy that can"}
                                                                    : unpacked_copy(dataset, layout.revision, options.unpack_folder);
-    if (copy) {
+    if (Result<GDALDatasetUniquePtr> opened = copy ? open_dataset(copy.value()) : copy.error(); opened) {
       layout.file = copy.value();
+      copied = std::move(opened).value();
     } else {
       about.hints.push_back(fmt::format("{} is a progressive JPEG, which cannot be read in parts: it is decoded whole, again and again, and takes {:.0f} MB "
                                         "more for each worker ({}); gdal_translate -of COG makes a file without that.",
-                                        options.path, decoder_bytes / 1e6, copy.error().message));
+                                        options.path, decoder_bytes / 1e6, opened.error().message));
     }
+  }
+  // Overviews were made with the file's own no-data value: another one has been averaged into them.
+  const bool own_voids = options.no_data && no_data_of(*dataset.GetRasterBand(1), GdalOptions{}) != options.no_data;
+  plan_levels(layout, size_of(*dataset.GetRasterBand(1)), own_voids ? std::vector<LevelSize>{} : overviews_of(copied ? *copied : dataset, bands));
+  constexpr double kManySamples = 2e8;
+  if (static_cast<double>(layout.georeference.width) * layout.georeference.height > kManySamples && about.levels.size() > 1 && layout.levels[1].overview < 0) {
+    about.hints.push_back(fmt::format("{} is large and has no overviews, which makes it slow from afar: run gdaladdo on it once.", options.path));
   }
   layout.heights = plan_heights(*dataset.GetRasterBand(1), options, world);
   return layout;
