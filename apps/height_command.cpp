@@ -2,6 +2,7 @@
 #include "commands.h"
 
 #include <iostream>
+#include <chrono>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -33,6 +34,7 @@ bool parse_place(const std::string& line, std::string words[2], geo::LatLon& pla
 int heights(const Options& options, globe::HeightLookup lookup, double spacing) {
   auto globe = open_globe(options);
   if (!globe) return report(globe.error());
+  (void)(*globe)->wait_for_catalogues(std::chrono::steady_clock::time_point::max());
   auto sampler = (*globe)->height_sampler();
   if (!sampler) return report(sampler.error());
   int status = (*globe)->data_missing() ? kDataMissing : kDone;

@@ -116,6 +116,7 @@ int info(const InfoOptions& options) {
     if (!layer.error.empty()) fmt::print("  error       {}\n", layer.error);
   }
   for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
+  for (const std::string& problem : (*globe)->problems()) fmt::print(stderr, "tellurion: {}\n", problem);
   if (!options.picture.empty()) {
     if (const auto drawn = draw_picture(options, shown, (*globe)->layers()); !drawn) return report(drawn.error());
   }

@@ -1,3 +1,4 @@
+#include <chrono>
 #include "options.h"
 
 #include <algorithm>
@@ -154,6 +155,9 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
   globe_options.time = options.view.time;
   auto globe = globe::Globe::open(std::move(*world), globe_options);
   if (globe) {
+    // A picture shows all of a catalogue, a window what is known of it.
+    constexpr std::chrono::minutes kPatience{10};
+    if (use == RenderThreadUse::waits) (void)(*globe)->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience);
     for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
   }
   return globe;

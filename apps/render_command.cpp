@@ -81,8 +81,12 @@ int render(const Options& options) {
   }
   if (options.after_ms) return (*globe)->data_missing() ? kDataMissing : kDone;
   if (!complete || (*globe)->data_missing()) {
-    const auto hints = (*globe)->hints();  // printed when the world was opened
-    const auto is_known = [&](const std::string& error) { return std::find(hints.begin(), hints.end(), error) != hints.end(); };
+    auto told = (*globe)->hints();  // printed when the world was opened
+    for (const std::string& problem : (*globe)->problems()) {
+      fmt::print(stderr, "tellurion: {}\n", problem);
+      told.push_back(problem);
+    }
+    const auto is_known = [&](const std::string& error) { return std::find(told.begin(), told.end(), error) != told.end(); };
     for (const auto& source : (*globe)->source_stats())
       if (!source.last_error.empty() && !is_known(source.last_error)) fmt::print(stderr, "tellurion: {}\n", source.last_error);
     fmt::print(stderr, "tellurion: {} is written, but {}\n", options.out.string(),

@@ -1,7 +1,9 @@
 #include "globe/globe.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <mutex>
@@ -13,6 +15,7 @@
 #include "cache/block_cache.h"
 #include "globe/height_tables.h"
 #include "globe/kept_files.h"
+#include "globe/layer_catalogue.h"
 #include "globe/surface_steps.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
@@ -146,11 +149,14 @@ struct Globe::State {
   GlobeOptions options;
   cache::BlockCache blocks;
   std::shared_ptr<fetch::ByteStore> store;  ///< null: no layer needs it
-  std::shared_ptr<const surface::SurfaceDescription> surface;
   std::vector<LayerInfo> layers;
   std::unique_ptr<SurfaceSteps> steps;
+  std::atomic<std::uint32_t> next_data_set{1u << 31};       ///< number of the next data set of a catalogue: layers have small ones
+  std::vector<std::unique_ptr<LayerCatalogue>> catalogues;  ///< of each layer; null for those of other types
+  std::mutex store_mutex;                                   ///< guards `store` while it is made
 
   mutable std::mutex mutex;  ///< guards what follows
+  std::shared_ptr<const surface::SurfaceDescription> surface;
   std::shared_ptr<const surface::ErrorTable> table;
   std::shared_ptr<const surface::SurfaceFacts> facts;
   std::vector<std::pair<std::shared_ptr<const surface::SurfaceDescription>, std::shared_ptr<const surface::SurfaceFacts>>> other_facts;  ///< of other times
@@ -162,12 +168,15 @@ struct Globe::State {
 
   std::shared_ptr<fetch::ByteStore> needed_store();
   Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
+  Result<std::unique_ptr<LayerCatalogue>> open_catalogue(const LayerSpec& spec, std::size_t layer);
+  void show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
   void open_layers();
   void take_table(std::shared_ptr<const surface::ErrorTable> found);
 };
 
 /// The store of bytes, made for the first layer that needs it.
 std::shared_ptr<fetch::ByteStore> Globe::State::needed_store() {
+  std::lock_guard lock(store_mutex);
   if (!store) {
     fetch::StoreOptions how;
     if (!options.cache_folder.empty()) how.disk_file = kept_database(options.cache_folder);
@@ -203,22 +212,56 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
   return source::open_gdal(how, world.ellipsoid);
 }
 
+Result<std::unique_ptr<LayerCatalogue>> Globe::State::open_catalogue(const LayerSpec& spec, std::size_t layer) {
+  LayerCatalogue::Setting setting;
+  setting.layer = spec;
+  setting.world = world.ellipsoid;
+  setting.cache_folder = options.cache_folder;
+  setting.open = [this](const LayerSpec& one) { return open_source(one); };
+  setting.next_id = [this] { return next_data_set++; };
+  setting.look_into_more = [this, layer] {
+    pool->submit_background([this, layer](int) { catalogues[layer]->examine_some(); });
+  };
+  setting.publish = [this, layer](std::shared_ptr<const source::Catalogue> catalogue) { show_catalogue(layer, std::move(catalogue)); };
+  return LayerCatalogue::open(std::move(setting));
+}
+
+void Globe::State::show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
+  steps->set_catalogue(layer, std::move(catalogue));
+  auto changed = steps->at(options.time);
+  std::lock_guard lock(mutex);
+  surface = std::move(changed);
+  facts = surface::make_facts(surface, table);
+  other_facts.clear();
+}
+
 void Globe::State::open_layers() {
   for (const LayerSpec& spec : world.layers) {
     LayerInfo info;
     info.spec = spec;
     SourceStats stats;
     stats.name = spec.name;
+    const auto fail = [&](const Error& error) {
+      const std::string place = spec.line > 0 ? fmt::format("{}:{}: ", world.file.string(), spec.line) : "";
+      stats.errors = 1;
+      stats.last_error = info.error = place + error.message;
+    };
+    catalogues.emplace_back();
     if (spec.enabled && spec.source.raster) {
       info.raster = spec.source.raster;
+    } else if (spec.enabled && spec.source.type == "catalogue") {
+      if (auto catalogue = open_catalogue(spec, layers.size())) {
+        catalogues.back() = std::move(*catalogue);
+        info.catalogue = catalogues.back()->current();
+      } else {
+        fail(catalogue.error());
+      }
     } else if (spec.enabled && !spec.source.time) {
       auto source = open_source(spec);
       if (source) {
         info.raster = std::move(*source);
       } else {
-        const std::string place = spec.line > 0 ? fmt::format("{}:{}: ", world.file.string(), spec.line) : "";
-        stats.errors = 1;
-        stats.last_error = info.error = place + source.error().message;
+        fail(source.error());
       }
     }
     layers.push_back(std::move(info));
@@ -251,6 +294,9 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
   s.tables = std::make_unique<HeightTables>(s.surface, s.blocks, options.cache_folder, *s.pool,
                                             [&s](std::shared_ptr<const surface::ErrorTable> table) { s.take_table(std::move(table)); });
   s.tables->load(options.scan_heights);
+  for (const auto& catalogue : s.catalogues) {
+    if (catalogue) catalogue->begin();
+  }
   return globe;
 }
 
@@ -271,6 +317,18 @@ std::vector<std::string> Globe::hints() const {
   return hints;
 }
 
+std::vector<std::string> Globe::problems() const {
+  std::vector<std::string> sentences;
+  for (const auto& catalogue : state_->catalogues) {
+    if (!catalogue) continue;
+    const LayerCatalogue::Problems found = catalogue->problems();
+    sentences.insert(sentences.end(), found.sentences.begin(), found.sentences.end());
+    const auto told = static_cast<std::int64_t>(found.sentences.size());
+    if (found.count > told) sentences.push_back(fmt::format("and {} more rasters of a catalogue were left out", found.count - told));
+  }
+  return sentences;
+}
+
 std::vector<SourceStats> Globe::source_stats() const {
   std::vector<SourceStats> all = state_->sources;
   for (std::size_t layer = 0; layer < all.size(); ++layer) {
@@ -284,6 +342,13 @@ std::vector<SourceStats> Globe::source_stats() const {
     const SurfaceSteps::Failures failures = state_->steps->failures_of(layer);
     all[layer].errors += failures.count;
     if (failures.count > 0) all[layer].last_error = failures.last_error;
+    if (const auto& catalogue = state_->catalogues[layer]) {
+      const LayerCatalogue::Problems problems = catalogue->problems();
+      const source::OpenDataSets::Failures unopened = catalogue->current()->open_sets()->failures();
+      all[layer].errors += problems.count + unopened.count;
+      if (!problems.sentences.empty()) all[layer].last_error = problems.sentences.back();
+      if (unopened.count > 0) all[layer].last_error = unopened.last_error;
+    }
   }
   return all;
 }
@@ -291,6 +356,8 @@ std::vector<SourceStats> Globe::source_stats() const {
 bool Globe::data_missing() const {
   for (std::size_t layer = 0; layer < state_->layers.size(); ++layer) {
     if (!state_->layers[layer].error.empty() || state_->steps->failures_of(layer).count > 0) return true;
+    const auto& catalogue = state_->catalogues[layer];
+    if (catalogue && (catalogue->problems().count > 0 || catalogue->current()->open_sets()->failures().count > 0)) return true;
     for (const std::uint32_t id : state_->steps->source_ids(layer)) {
       if (state_->blocks.reads_of(id).lost > 0) return true;
     }
@@ -337,6 +404,28 @@ view::Pose Globe::home() const {
   return pose;
 }
 
+Result<void> Globe::insert(std::size_t layer, const std::vector<std::string>& rasters) {
+  if (layer >= state_->catalogues.size() || !state_->catalogues[layer])
+    return Error{ErrorCode::invalid_argument, fmt::format("layer {} is no catalogue: rasters cannot be put into it", layer)};
+  state_->catalogues[layer]->insert(rasters);
+  return {};
+}
+
+Result<void> Globe::remove(std::size_t layer, const std::vector<std::string>& rasters) {
+  if (layer >= state_->catalogues.size() || !state_->catalogues[layer])
+    return Error{ErrorCode::invalid_argument, fmt::format("layer {} is no catalogue: no rasters can be taken out of it", layer)};
+  state_->catalogues[layer]->remove(rasters);
+  return {};
+}
+
+std::shared_ptr<const source::Catalogue> Globe::catalogue_of(std::size_t layer) const {
+  return state_->catalogues[layer] ? state_->catalogues[layer]->current() : nullptr;
+}
+
+bool Globe::catalogues_ready() const {
+  return std::ranges::all_of(state_->catalogues, [](const auto& catalogue) { return !catalogue || catalogue->is_complete(); });
+}
+
 bool Globe::tables_ready() const { return state_->tables->ready(); }
 
 void Globe::begin_tables() { state_->tables->begin_scan(); }
@@ -350,7 +439,10 @@ bool Globe::wait_for_tables(std::chrono::steady_clock::time_point deadline) {
   return true;
 }
 
-std::shared_ptr<const surface::SurfaceDescription> Globe::surface() const { return state_->surface; }
+std::shared_ptr<const surface::SurfaceDescription> Globe::surface() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->surface;
+}
 
 std::shared_ptr<const surface::SurfaceFacts> Globe::facts() const {
   std::lock_guard lock(state_->mutex);
@@ -411,8 +503,16 @@ HeightSampler::HeightSampler(std::unique_ptr<State> state) : state_(std::move(st
 HeightSampler::HeightSampler(HeightSampler&&) noexcept = default;
 HeightSampler::~HeightSampler() = default;
 
+bool Globe::wait_for_catalogues(std::chrono::steady_clock::time_point deadline) {
+  while (!catalogues_ready()) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    if (!run_one()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
 Result<HeightSampler> Globe::height_sampler() const {
-  auto model = surface::ElevationModel::open(state_->surface, state_->blocks);
+  auto model = surface::ElevationModel::open(surface(), state_->blocks);
   if (!model) return model.error();
   const double half_circumference = std::numbers::pi * ellipsoid().a();
   return HeightSampler(std::make_unique<HeightSampler::State>(HeightSampler::State{std::move(*model), half_circumference}));

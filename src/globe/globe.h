@@ -20,7 +20,10 @@
 #include "view/camera.h"
 
 namespace tellurion::cache { class BlockCache; }
-namespace tellurion::source { class RasterSource; }
+namespace tellurion::source {
+class Catalogue;
+class RasterSource;
+}
 namespace tellurion::surface {
 struct SurfaceDescription;
 class SurfaceFacts;
@@ -72,6 +75,7 @@ struct LayerInfo {
   LayerSpec spec;
   std::shared_ptr<const source::RasterSource> raster;   ///< null: disabled, of a group that is not drawn, or not opened
   std::string error;                                    ///< why it was not opened
+  std::shared_ptr<const source::Catalogue> catalogue{}; ///< of type "catalogue", as it was when the world was opened
 };
 
 /// A world that is open. Its functions are thread-safe unless they say otherwise.
@@ -96,6 +100,8 @@ class Globe {
 
   /// Sentences that a user should see: layers left out, data without a vertical datum.
   std::vector<std::string> hints() const;
+  /// Sentences on what was found wrong since, with the rasters of catalogues: the first few of each, and how many more there are.
+  std::vector<std::string> problems() const;
   std::vector<SourceStats> source_stats() const;
   /// Whether some data could not be read and never will: what may still come does not count.
   bool data_missing() const;
@@ -103,6 +109,18 @@ class Globe {
   std::size_t disk_cache_bytes() const;
   fetch::FetchStats fetch_stats() const;
   std::size_t memory_budget_bytes() const;
+
+  /// Puts rasters (paths or URLs) into a layer of type "catalogue", in the place of those of the same path; or takes some out. Both return at
+  /// once; files are looked into by workers, and only the tiles that they touch are made anew. Kept while the globe is open.
+  /// Errors: invalid_argument (no such layer, or none of that type).
+  Result<void> insert(std::size_t layer, const std::vector<std::string>& rasters);
+  Result<void> remove(std::size_t layer, const std::vector<std::string>& rasters);
+  /// A catalogue's rasters as they are known now; null for other layers.
+  std::shared_ptr<const source::Catalogue> catalogue_of(std::size_t layer) const;
+  /// Whether all rasters of catalogues have been looked into.
+  bool catalogues_ready() const;
+  /// Waits for that (without threads: looks into them here). False if `deadline` came first.
+  bool wait_for_catalogues(std::chrono::steady_clock::time_point deadline);
 
   /// Error tables of the height sources: made in the background, kept in the cache folder.
   bool tables_ready() const;
@@ -114,7 +132,7 @@ class Globe {
   Result<HeightSampler> height_sampler() const;
 
   // For the views of this globe.
-  std::shared_ptr<const surface::SurfaceDescription> surface() const;  ///< at GlobeOptions::time; its heights hold at all times
+  std::shared_ptr<const surface::SurfaceDescription> surface() const;  ///< at GlobeOptions::time; its heights hold at all times, until a catalogue changes
   std::shared_ptr<const surface::SurfaceFacts> facts() const;   ///< of it; replaced when the tables are ready
   /// The surface at another time (opens files where a step comes up): the same object while no layer's step changes.
   std::shared_ptr<const surface::SurfaceDescription> surface_at(const std::optional<UtcTime>& time) const;

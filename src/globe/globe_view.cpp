@@ -59,7 +59,7 @@ std::vector<std::uint32_t> missing_layers(const Finished& item) {
 }  // namespace
 
 struct GlobeView::State {
-  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()), surface(g.surface()) {}
+  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()), surface(g.surface()), heights(g.surface()) {}
 
   Globe& globe;
   gpu::RenderThread& thread;
@@ -68,8 +68,11 @@ struct GlobeView::State {
   std::shared_ptr<const surface::SurfaceDescription> surface;  ///< at the time that is shown
   std::shared_ptr<const surface::SurfaceFacts> facts;          ///< of it
   std::shared_ptr<const surface::SurfaceFacts> first_facts;    ///< of the globe: tell when the tables change
-  SlotAges slots;
+  std::shared_ptr<const surface::SurfaceDescription> heights;  ///< the surface whose heights are shown
+  SlotAges slots{Part::colour};
+  SlotAges meshes{Part::geometry};                             ///< but for the roots: see roots_to_renew
   SlotAges::Stale stale;                                       ///< of the last frame
+  SlotAges::Stale stale_meshes;
   /// Room for all that can be in flight, so that no worker ever waits on it.
   std::shared_ptr<FinishedQueue> finished;
   GroundBelow ground;
@@ -96,7 +99,10 @@ struct GlobeView::State {
   bool submit(const geo::TileKey& key, Part part);
   void renew_roots();
   void show_surface_at(const ViewSettings& settings);
-  void renew_colours();
+  SlotAges& ages(Part part) { return part == Part::colour ? slots : meshes; }
+  bool is_stale() const { return stale.any || stale_meshes.any; }
+  void show_heights();
+  void renew_parts();
   void resume_waiting();
   void order_waiting();
   void foresee(const view::Camera& camera, const ViewSettings& settings, Clock::time_point now);
@@ -112,9 +118,9 @@ struct GlobeView::State {
 };
 
 bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
-  return globe.try_submit([queue = finished, heights = globe.surface(), surface = surface, facts = facts, key, part,
+  return globe.try_submit([queue = finished, heights = heights, surface = surface, facts = facts, key, part,
                            token = stop.get_token()](SurfaceWorker& worker) {
-    Finished item{key, part, surface->revision, {}};
+    Finished item{key, part, (part == Part::geometry ? heights : surface)->revision, {}};
     if (part == Part::geometry) {
       auto geometry = worker.build_geometry(heights, *facts, key, token);
       if (geometry) item.content = std::move(*geometry);
@@ -160,14 +166,26 @@ void GlobeView::State::show_surface_at(const ViewSettings& settings) {
   });
 }
 
-/// Has the slots composed anew that are shown and hold what is over; they are shown until then.
-void GlobeView::State::renew_colours() {
+/// A catalogue of heights has changed: the tiles that what came or went touches are built anew.
+void GlobeView::State::show_heights() {
+  auto latest = globe.surface();
+  if (latest == heights) return;
+  meshes.layers_changed(*heights, *latest);
+  tree.forget_failures(Part::geometry);
+  heights = std::move(latest);
+}
+
+/// Has what is shown and no longer true made anew; it is shown until then.
+void GlobeView::State::renew_parts() {
   stale = slots.find(selection->draw, Clock::now());
-  for (const geo::TileKey& key : stale.to_ask) {
-    if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting || !submit(key, Part::colour)) return;
-    slots.asked(key);
-    ++in_flight;
-    ++stats.requests;
+  stale_meshes = meshes.find(selection->draw, Clock::now());
+  for (const Part part : {Part::colour, Part::geometry}) {
+    for (const geo::TileKey& key : (part == Part::colour ? stale : stale_meshes).to_ask) {
+      if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting || !submit(key, part)) return;
+      ages(part).asked(key);
+      ++in_flight;
+      ++stats.requests;
+    }
   }
 }
 
@@ -178,10 +196,10 @@ void GlobeView::State::resume_waiting() {
       ++in_flight;
       return true;
     }
-    const bool renews = part.part == Part::colour && slots.holds(part.key);
-    if (renews ? slots.is_wanted(part.key) : part.key.level == 0 || tree.is_wanted(part.key, part.part)) return false;
+    const bool renews = ages(part.part).holds(part.key);
+    if (renews ? ages(part.part).is_wanted(part.key) : part.key.level == 0 || tree.is_wanted(part.key, part.part)) return false;
     tree.cancelled(part.key, part.part);
-    slots.not_asked(part.key);
+    ages(part.part).not_asked(part.key);
     ++stats.requests_cancelled;
     return true;
   });
@@ -220,7 +238,7 @@ bool GlobeView::State::make_room(Part part) {
     if (const auto key = tree.eviction_candidate(p)) {
       renderer->release(thread, *key, p);
       tree.released(*key, p);
-      if (p == Part::colour) slots.released(*key);
+      ages(p).released(*key);
       return true;
     }
   }
@@ -238,12 +256,13 @@ Result<void> GlobeView::State::upload(const Finished& item) {
 
 void GlobeView::State::take_over(Finished item) {
   --in_flight;
-  const bool renews = item.part == Part::colour && slots.holds(item.key);
-  const bool current = item.revision == surface->revision;
-  if (renews && !current) return slots.not_asked(item.key);  // the slot's own content is no older
+  SlotAges& age = ages(item.part);
+  const bool renews = age.holds(item.key);
+  const bool current = item.revision == (item.part == Part::colour ? surface : heights)->revision;
+  if (renews && !current) return age.not_asked(item.key);  // its own content is no older
   if (auto* awaited = std::get_if<source::Awaited>(&item.content)) {
     if (awaited->empty() && (renews || item.key.level > 0)) {  // another part has asked for them
-      slots.not_asked(item.key);
+      age.not_asked(item.key);
       return tree.cancelled(item.key, item.part);
     }
     waiting.push_back(waiting_part(item.key, item.part, std::move(*awaited)));
@@ -256,7 +275,7 @@ void GlobeView::State::take_over(Finished item) {
   const Result<void> result = built_wrong != nullptr ? Result<void>(*built_wrong) : upload(item);
   if (!result) {
     const Error& error = result.error();
-    if (renews) slots.not_asked(item.key);
+    if (renews) age.not_asked(item.key);
     const bool of_other_layers = item.part == Part::colour && !current;
     if (error.code == ErrorCode::cancelled || of_other_layers) return tree.cancelled(item.key, item.part);
     if (error.code == ErrorCode::exhausted && built_wrong == nullptr) {
@@ -266,13 +285,14 @@ void GlobeView::State::take_over(Finished item) {
     }
     const auto retry_at = note_failure(error, kPause);
     if (retry_at != Clock::time_point::max() && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.insert_or_assign(item.key, retry_at);
-    if (renews) slots.failed(item.key, retry_at);
+    if (renews) age.failed(item.key, retry_at);
     return tree.failed(item.key, item.part, retry_at);
   }
   if (item.part == Part::geometry) {
     patience.progressed(Clock::now());
     const auto& geometry = std::get<surface::TileGeometry>(item.content);
     tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
+    if (item.key.level > 0) meshes.composed(item.key, current);
   } else if (tree.arrived_colour(item.key); missing.empty()) {
     patience.progressed(Clock::now());
     slots.composed(item.key, current);
@@ -315,6 +335,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   resume_waiting();
   stats.upload_ms = ms_since(start);
 
+  show_heights();  // first: the surface shown below is then no older, and stats.complete rests on that
   show_surface_at(settings);
   if (auto latest = globe.facts(); latest != first_facts) {
     first_facts = std::move(latest);
@@ -335,15 +356,15 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
     if (in_flight >= max_in_flight || waiting.size() >= kMostWaiting) break;
     ask(request);
   }
-  renew_colours();
-  if (selection->requests.empty() && !stale.any) {
+  renew_parts();
+  if (selection->requests.empty() && !is_stale()) {
     for (const surface::TileRequest& request : ahead) {
       if (in_flight >= max_in_flight || waiting.size() >= kMostAhead) break;
       ask(request);
     }
   }
 
-  steps.foresee(globe, settings.time, start, *surface, selection->draw, transitions && selection->requests.empty() && !stale.any);
+  steps.foresee(globe, settings.time, start, *surface, selection->draw, transitions && selection->requests.empty() && !is_stale());
 
   const surface::SelectionStats& s = selection->stats;
   stats.time = std::chrono::duration<double>(start - created).count();
@@ -354,7 +375,7 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !stale.any && !(transitions && steps.is_behind());
+  stats.complete = s.complete && globe.tables_ready() && globe.catalogues_ready() && heights == globe.surface() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !is_stale() && !(transitions && steps.is_behind());
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
@@ -379,7 +400,7 @@ bool GlobeView::State::has_given_up() {
   patience.received(globe.fetch_stats().bytes, now);
   if (patience.is_over(now)) return true;
   const bool idle = in_flight == 0 && waiting.empty() && roots_to_renew == 0 && roots_to_retry.empty() && selection->requests.empty();
-  return idle && !selection->stats.retries_later && !stale.may_change && first_facts == globe.facts();
+  return idle && !selection->stats.retries_later && !stale.may_change && !stale_meshes.may_change && first_facts == globe.facts() && globe.catalogues_ready();
 }
 
 Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& key) {

@@ -1,6 +1,7 @@
 #include "globe/slot_ages.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace tellurion::globe {
 namespace {
@@ -9,24 +10,37 @@ constexpr std::uint64_t kFramesWanted = 3;  ///< a slot out of sight for longer 
 
 using Layers = std::vector<surface::Layer>;
 
-/// The layers of `some` whose source `others` lack.
-std::vector<const surface::Layer*> only_in(const Layers& some, const Layers& others) {
-  std::vector<const surface::Layer*> found;
+/// Where `some` show what `others` do not; both outlive the answer.
+void add_differing(const Layers& some, const Layers& others, std::vector<const source::Coverage*>& found) {
   for (const surface::Layer& layer : some) {
-    const auto same = [&](const surface::Layer& other) { return other.source_id == layer.source_id && other.source == layer.source; };
-    if (std::ranges::none_of(others, same)) found.push_back(&layer);
+    const auto same = [&](const surface::Layer& other) { return other.source_id == layer.source_id && other.source == layer.source && !other.catalogue == !layer.catalogue; };
+    if (std::ranges::none_of(others, same)) found.push_back(&surface::coverage_of(layer));
   }
-  return found;
+}
+
+/// The data sets that a catalogue has gained or lost.
+source::Catalogue::Sets changed_sets(const Layers& before, const Layers& now) {
+  source::Catalogue::Sets changed;
+  for (const surface::Layer& layer : now) {
+    const auto old = std::ranges::find(before, layer.source_id, &surface::Layer::source_id);
+    if (!layer.catalogue || old == before.end() || !old->catalogue || old->catalogue == layer.catalogue) continue;
+    std::ranges::move(source::difference(*old->catalogue, *layer.catalogue), std::back_inserter(changed));
+  }
+  return changed;
 }
 
 }  // namespace
 
 void SlotAges::layers_changed(const surface::SurfaceDescription& before, const surface::SurfaceDescription& now) {
-  std::vector<const surface::Layer*> changed = only_in(before.colours, now.colours);
-  const std::vector<const surface::Layer*> come = only_in(now.colours, before.colours);
-  changed.insert(changed.end(), come.begin(), come.end());
+  const Layers& old_layers = part_ == surface::Part::colour ? before.colours : before.heights;
+  const Layers& new_layers = part_ == surface::Part::colour ? now.colours : now.heights;
+  std::vector<const source::Coverage*> changed;
+  add_differing(old_layers, new_layers, changed);
+  add_differing(new_layers, old_layers, changed);
+  const source::Catalogue::Sets sets = changed_sets(old_layers, new_layers);
+  for (const auto& set : sets) changed.push_back(&set->footprint);
   for (auto& [key, slot] : slots_) {
-    if (std::ranges::any_of(changed, [&](const surface::Layer* layer) { return layer->source->coverage().touches(key); })) slot.stale = true;
+    if (std::ranges::any_of(changed, [&](const source::Coverage* coverage) { return coverage->touches(key); })) slot.stale = true;
     slot.retry_at = {};
   }
 }
@@ -45,7 +59,8 @@ SlotAges::Stale SlotAges::find(std::span<const surface::DrawTile> drawn, TimePoi
   ++frame_;
   Stale stale;
   for (const surface::DrawTile& tile : drawn) {
-    for (const geo::TileKey& owner : {tile.colour_owner, tile.colour_before}) {
+    const bool colour = part_ == surface::Part::colour;
+    for (const geo::TileKey& owner : {colour ? tile.colour_owner : tile.key, colour ? tile.colour_before : tile.slope_owner}) {
       const auto found = slots_.find(owner);
       if (found == slots_.end() || !found->second.stale) continue;
       Slot& slot = found->second;

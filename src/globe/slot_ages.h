@@ -1,5 +1,5 @@
-// Which colour slots show what their layers held before a time step changed, and are to be composed anew.
-// Lives on the render thread.
+// Which tiles' colour slots, or geometry, show what their layers held before a time step or a catalogue changed, and are to be made
+// anew. Below a slot is either. Lives on the render thread.
 #pragma once
 
 #include <chrono>
@@ -12,12 +12,15 @@
 #include "geo/tile_key.h"
 #include "surface/draw_list.h"
 #include "surface/elevation_model.h"
+#include "surface/tile_tree.h"
 
 namespace tellurion::globe {
 
 class SlotAges {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
+
+  explicit SlotAges(surface::Part part) : part_(part) {}
 
   bool holds(const geo::TileKey& key) const { return slots_.contains(key); }
   /// A slot was composed; `current`: of the layers as they are now.
@@ -57,6 +60,7 @@ class SlotAges {
   };
   void set_asked(const geo::TileKey& key, bool on);
 
+  surface::Part part_;
   std::map<geo::TileKey, Slot> slots_;
   std::uint64_t frame_ = 0;
 };

@@ -23,7 +23,7 @@ bool has_layer(const surface::SurfaceDescription& surface, std::uint32_t source_
 /// Whether a layer that only `next` has touches the tile.
 bool changes(const surface::SurfaceDescription& shown, const surface::SurfaceDescription& next, const geo::TileKey& key) {
   return std::ranges::any_of(next.colours, [&](const surface::Layer& layer) {
-    return !has_layer(shown, layer.source_id) && layer.source->coverage().touches(key);
+    return !has_layer(shown, layer.source_id) && surface::coverage_of(layer).touches(key);
   });
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 
 #include "base/log.h"
 
@@ -36,7 +37,7 @@ surface::ImageUse use_of(LayerGroup group) {
 SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open)
     : ellipsoid_(ellipsoid), open_(std::move(open)), next_id_(static_cast<std::uint32_t>(layers.size())) {
   for (const LayerInfo& info : layers) {
-    OneLayer layer{info.spec, info.raster, {}};
+    OneLayer layer{info.spec, info.raster, {}, info.catalogue};
     if (info.spec.source.time && info.spec.enabled) {
       if (auto times = source::TimeSteps::create(*info.spec.source.time)) layer.timed = TimedLayer{std::move(*times), {}, {}, {}};
       has_times_ = has_times_ || layer.timed.has_value();
@@ -103,14 +104,23 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
   for (std::size_t i = 0; i < layers_.size(); ++i) sources.push_back(layers_[i].timed ? source_of(layers_[i], steps[i]) : layers_[i].fixed);
   std::lock_guard lock(mutex_);
   if (auto same = held(steps)) return same;
+  auto description = describe(steps, sources);
+  surfaces_.emplace_front(std::move(steps), description);
+  if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
+  return description;
+}
+
+/// With the lock held.
+std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::describe(const Steps& steps, const std::vector<Source>& sources) {
   auto description = std::make_shared<surface::SurfaceDescription>();
   description->ellipsoid = ellipsoid_;
   description->revision = ++last_revision_;
   for (const std::size_t i : order_) {
     const OneLayer& one = layers_[i];
-    if (!sources[i]) continue;
+    if (!sources[i] && !one.catalogue) continue;
     surface::Layer layer;
     layer.source = sources[i];
+    layer.catalogue = one.catalogue;
     layer.name = one.spec.name;
     layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : static_cast<std::uint32_t>(i);
     layer.opacity = static_cast<float>(one.spec.opacity);
@@ -120,9 +130,23 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
     layer.use = use_of(one.spec.group);
     (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
   }
-  surfaces_.emplace_front(std::move(steps), description);
-  if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
   return description;
+}
+
+void SurfaceSteps::set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
+  std::lock_guard lock(mutex_);
+  layers_[layer].catalogue = std::move(catalogue);
+  // Frames ask for these: they must find them without opening anything.
+  for (auto& [steps, description] : surfaces_) {
+    auto changed = std::make_shared<surface::SurfaceDescription>(*description);
+    changed->revision = ++last_revision_;
+    for (auto* group : {&changed->heights, &changed->colours}) {
+      for (surface::Layer& one : *group) {
+        if (one.source_id == layer && one.catalogue) one.catalogue = layers_[layer].catalogue;
+      }
+    }
+    description = std::move(changed);
+  }
 }
 
 std::shared_ptr<const source::RasterSource> SurfaceSteps::raster_at(std::size_t layer, const std::optional<UtcTime>& time) {
@@ -141,6 +165,7 @@ std::vector<std::uint32_t> SurfaceSteps::source_ids(std::size_t layer) const {
   if (const auto& timed = layers_[layer].timed) {
     for (const auto& [step, id] : timed->ids) ids.push_back(id);
   }
+  if (const auto& catalogue = layers_[layer].catalogue) std::ranges::copy(catalogue->open_sets()->opened_ids(), std::back_inserter(ids));
   return ids;
 }
 

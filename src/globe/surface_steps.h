@@ -35,6 +35,9 @@ class SurfaceSteps {
   /// The same, but opens nothing: null if it is not among the last few.
   std::shared_ptr<const surface::SurfaceDescription> held_at(const std::optional<UtcTime>& time);
 
+  /// A layer shows another catalogue from now on.
+  void set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
+
   /// A layer's source at `time`; null: it has none.
   std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time);
   /// How the step of a layer is written; empty if it has no times.
@@ -63,6 +66,7 @@ class SurfaceSteps {
     LayerSpec spec;
     Source fixed;                     ///< null: it has times, or nothing is drawn of it
     std::optional<TimedLayer> timed;
+    std::shared_ptr<const source::Catalogue> catalogue;  ///< guarded by mutex_, unlike what is above
   };
   using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
 
@@ -70,6 +74,7 @@ class SurfaceSteps {
   /// Opens it if it is not open, without the lock.
   Source source_of(OneLayer& layer, std::int64_t step);
   std::shared_ptr<const surface::SurfaceDescription> held(const Steps& steps);
+  std::shared_ptr<const surface::SurfaceDescription> describe(const Steps& steps, const std::vector<Source>& sources);
 
   geo::Ellipsoid ellipsoid_;
   OpenSource open_;

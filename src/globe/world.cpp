@@ -106,7 +106,8 @@ class WorldReader {
     const std::string& type = layer.source.type;
     if (layer.source.time && layer.group == LayerGroup::height) fail(table, "heights have no `time`: only pictures change with it");
     if (is_drawn_by_itself(type) && layer.group == LayerGroup::height) fail(table, fmt::format("a source of type \"{}\" is a picture: its group is \"color\"", type));
-    const std::string unnamed = !layer.source.url.empty() ? fetch::public_part(layer.source.url) : is_drawn_by_itself(type) ? type : layer.source.path.stem().string();
+    const std::string first_file = layer.source.catalogue.files.empty() ? "" : layer.source.catalogue.files.front();
+    const std::string unnamed = type == "catalogue" && layer.source.path.empty() ? std::filesystem::path(first_file).stem().string() : !layer.source.url.empty() ? fetch::public_part(layer.source.url) : is_drawn_by_itself(type) ? type : layer.source.path.stem().string();
     layer.name = text(table, "name").value_or(unnamed);
     return layer;
   }
@@ -119,15 +120,32 @@ class WorldReader {
     if (is_archive(source.type)) return read_archive(table, source);
     if (source.is_service()) return read_service(table, source);
     if (is_drawn_by_itself(source.type)) return read_drawn(table, source);
+    if (source.type == "catalogue") return read_catalogue(table, source);
     const bool image = source.type == "image";
     if (source.type != "gdal" && !image) {
       return fail(table.contains("type") ? *table.get("type") : static_cast<const toml::node&>(table),
-                  fmt::format("no source is of type \"{}\": it is gdal, image, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles, cog, tile-index or scale", source.type), ErrorCode::unsupported);
+                  fmt::format("no source is of type \"{}\": it is gdal, catalogue, image, xyz, wmts, wms, tms, cesium-terrain, mbtiles, geopackage, pmtiles, cog, tile-index or scale", source.type), ErrorCode::unsupported);
     }
     expect_keys(table, "source", {"type", "path", "time", image ? "bounds" : "crs", "vertical", "no_data", "scale", "offset", "bands"});
     if (image) source.bounds = read_bounds(table, 360.0).value_or(std::array{-180.0, -90.0, 180.0, 90.0});
     read_path(table, source);
     read_time(table, source.path.string(), source);
+    read_samples(table, source);
+  }
+
+  void read_catalogue(const toml::table& table, SourceSpec& source) {
+    expect_keys(table, "source", {"type", "path", "files", "order", "crs", "vertical", "no_data", "scale", "offset", "bands"});
+    if (table.contains("path")) read_path(table, source);
+    if (const toml::node* files = table.get("files")) {
+      read_texts(*files, "files", source.catalogue.files);
+      for (std::string& file : source.catalogue.files) {
+        if (!is_web_address(file)) file = (folder_ / file).lexically_normal().string();
+      }
+    }
+    if (!table.contains("path") && !table.contains("files"))
+      fail(table, "a catalogue needs a `path` (a folder, a VRT, an index of gdaltindex, STAC items) or `files = [...]`");
+    source.catalogue.order = text(table, "order").value_or("finest");
+    if (source.catalogue.order != "finest" && source.catalogue.order != "listed") fail(*table.get("order"), "`order` is \"finest\" or \"listed\"");
     read_samples(table, source);
   }
 

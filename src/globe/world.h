@@ -42,6 +42,12 @@ struct ServiceSpec {
   std::optional<int> max_level;
 };
 
+/// What a source of type "catalogue" holds.
+struct CatalogueSpec {
+  std::vector<std::string> files;  ///< absolute paths or URLs, besides what the list in SourceSpec::path names
+  std::string order = "finest";    ///< which lies over which: the finer ones, or as "listed"
+};
+
 /// Where a layer's data come from. `path` is absolute once a world is loaded.
 struct SourceSpec {
   std::string type = "gdal";
@@ -71,6 +77,8 @@ struct SourceSpec {
   std::shared_ptr<const source::RasterSource> raster;  ///< what an embedding program draws or reads itself: instead of all above
 
   ServiceSpec service;                      ///< of types "wmts", "wms" and "tms", which also have url, headers and the like
+
+  CatalogueSpec catalogue;                  ///< of type "catalogue"; there `path`, if any, is a list: see source::list_rasters
 
   bool is_service() const { return type == "wmts" || type == "wms" || type == "tms"; }
 };

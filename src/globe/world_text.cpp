@@ -67,6 +67,21 @@ void add_service(const SourceSpec& source, toml::table& table) {
   if (source.vertical) table.insert("vertical", *source.vertical);
 }
 
+/// As a world file in `folder` names it.
+std::string path_in(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  const auto relative = path.lexically_relative(folder);
+  const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
+  return (inside ? relative : path).generic_string();
+}
+
+/// What source_table has to say of a catalogue only.
+void add_catalogue(const SourceSpec& source, const std::filesystem::path& folder, toml::table& table) {
+  std::vector<std::string> files;
+  for (const std::string& file : source.catalogue.files) files.push_back(file.starts_with("http") ? file : path_in(file, folder));
+  if (!files.empty()) table.insert("files", array_of(files));
+  if (source.catalogue.order != CatalogueSpec{}.order) table.insert("order", source.catalogue.order);
+}
+
 toml::table source_table(const SourceSpec& source, const std::filesystem::path& folder) {
   toml::table table;
   table.is_inline(true);
@@ -91,11 +106,10 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   }
   if (!source.url.empty()) {
     table.insert("url", source.url);
-  } else {
-    const auto relative = source.path.lexically_relative(folder);
-    const bool inside = !folder.empty() && !relative.empty() && *relative.begin() != "..";
-    table.insert("path", (inside ? relative : source.path).generic_string());
+  } else if (!source.path.empty() || source.type != "catalogue") {
+    table.insert("path", path_in(source.path, folder));
   }
+  if (source.type == "catalogue") add_catalogue(source, folder, table);
   insert_time(table, source);
   if (!source.subdomains.empty()) table.insert("subdomains", array_of(source.subdomains));
   if (!source.headers.empty()) table.insert("headers", texts_table(source.headers));

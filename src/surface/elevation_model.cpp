@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -79,15 +80,120 @@ int level_for_spacing(const source::RasterDescription& raster, double wanted_spa
 Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescription> description,
                                             cache::BlockCache& cache) {
   ElevationModel model;
+  model.cache_ = &cache;
   for (const Layer& layer : description->heights) {
     if (!layer.enabled) continue;
+    if (layer.catalogue) {
+      model.has_catalogue_ = true;
+      continue;
+    }
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
-    const geo::GeodeticBounds reach = reach_of(layer.source->description());
-    model.layers_.push_back({&layer, model.layers_.size(), std::move(raster).value(), reach, {}, {}});
+    model.layers_.emplace(&layer, HeightLayer{layer.source, std::move(raster).value(), reach_of(layer.source->description()), {}, {}});
   }
   model.description_ = std::move(description);
   return model;
+}
+
+// --- What contributes ------------------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr std::size_t kIdleDataSets = 64;      ///< kept open for the next batch
+constexpr std::size_t kMostContributors = 128; ///< of a catalogue to a batch: what lies below so many is hidden
+
+/// A region that holds all places.
+source::FaceRegion region_round(std::span<const geo::LatLon> places) {
+  const int face = geo::face_point(geo::normal_at(places.front())).face;
+  geo::FaceRect rect{glm::dvec2(INFINITY), glm::dvec2(-INFINITY)};
+  for (const geo::LatLon& place : places) {
+    const std::optional<glm::dvec2> at = geo::project_to_face(face, geo::normal_at(place));
+    constexpr double kFarthest = 1.5;
+    if (!at || std::max(std::abs(at->x), std::abs(at->y)) > kFarthest) return {face, {glm::dvec2(-2.0), glm::dvec2(2.0)}, {}};
+    rect = {glm::min(rect.lower, *at), glm::max(rect.upper, *at)};
+  }
+  return source::region_of(face, rect);
+}
+
+source::FaceRegion region_of(const TileLattice& lattice) {
+  const geo::FaceRect tile = geo::face_rect(lattice.key);
+  return source::region_of(lattice.key.face, {glm::mix(tile.lower, tile.upper, lattice.first), glm::mix(tile.lower, tile.upper, lattice.last)});
+}
+
+}  // namespace
+
+void ElevationModel::choose(const source::FaceRegion& region, double wanted_spacing) {
+  contributors_.clear();
+  close_unused();
+  const Radians least(kNarrowestDataSet * wanted_spacing / description_->ellipsoid.a());
+  for (const Layer& layer : description_->heights) {
+    if (!layer.enabled) continue;
+    if (!layer.catalogue) {
+      contributors_.push_back({&layer, &layers_.at(&layer), 0});
+      continue;
+    }
+    layer.catalogue->find(region, least, found_);
+    if (found_.size() > kMostContributors) found_.resize(kMostContributors);
+    for (const std::uint32_t index : std::views::reverse(found_)) contributors_.push_back({&layer, nullptr, index});
+  }
+}
+
+void ElevationModel::choose(std::span<const geo::LatLon> places, double wanted_spacing) {
+  choose(has_catalogue_ ? region_round(places) : source::FaceRegion{}, wanted_spacing);
+}
+
+/// Closes those of catalogues that were not used lately.
+void ElevationModel::close_unused() {
+  auto last = data_sets_.end();
+  for (std::size_t open = data_sets_.size(); open > kIdleDataSets && last != data_sets_.begin(); --open) {
+    --last;
+    if (last->second.raster.is_pending()) continue;  // the build that it belongs to has not asked yet
+    data_set_index_.erase(last->first);
+    last = data_sets_.erase(last);
+  }
+}
+
+/// Null if it cannot be opened; the catalogue knows why.
+ElevationModel::HeightLayer* ElevationModel::open_data_set(const source::Catalogue& catalogue, std::uint32_t index) {
+  const std::uint32_t id = catalogue.sets()[index]->id;
+  if (const auto found = data_set_index_.find(id); found != data_set_index_.end()) {
+    data_sets_.splice(data_sets_.begin(), data_sets_, found->second);
+    return &found->second->second;
+  }
+  auto source = catalogue.open(index);
+  if (!source) return nullptr;
+  Result<cache::CachedRaster> raster = cache::CachedRaster::open(**source, *cache_, id);
+  if (!raster) return nullptr;
+  const geo::GeodeticBounds reach = reach_of((*source)->description());
+  data_sets_.emplace_front(id, HeightLayer{std::move(*source), std::move(raster).value(), reach, {}, {}});
+  data_set_index_[id] = data_sets_.begin();
+  return &data_sets_.front().second;
+}
+
+ElevationModel::HeightLayer* ElevationModel::open(Contributor& contributor) {
+  if (contributor.raster == nullptr) contributor.raster = open_data_set(*contributor.settings->catalogue, contributor.index);
+  return contributor.raster;
+}
+
+Result<void> ElevationModel::for_each_under(const geo::TileKey& key, const Visit& visit) {
+  for (const Layer& layer : description_->heights) {
+    if (!layer.enabled) continue;
+    if (!layer.catalogue) {
+      if (!layer.source->coverage().touches(key)) continue;
+      if (Result<void> visited = visit(layers_.at(&layer).raster, layer.source->coverage().spacing_under(key)); !visited) return visited;
+      continue;
+    }
+    std::vector<std::uint32_t> found;
+    layer.catalogue->find(source::region_of(key), Radians(0), found);
+    if (found.size() > kMostContributors) found.resize(kMostContributors);
+    for (const std::uint32_t index : std::views::reverse(found)) {
+      close_unused();
+      HeightLayer* raster = open_data_set(*layer.catalogue, index);
+      if (raster == nullptr) continue;
+      if (Result<void> visited = visit(raster->raster, layer.catalogue->sets()[index]->footprint.spacing()); !visited) return visited;
+    }
+  }
+  return {};
 }
 
 /// Places whose heights are wanted: how a layer sees them, and where the answers go.
@@ -96,8 +202,8 @@ struct ElevationModel::Batch {
   std::span<double> metres;
   std::span<double> spacings;  ///< of the finest layer that contributed
 
-  /// Fills `inside` and `pixels` of the layer's samples, with those of `which` that it reaches.
-  virtual void find(HeightLayer& layer, std::span<const std::uint32_t> which) = 0;
+  /// Fills `inside` and `pixels` of a contributor's samples, with those of `which` that it reaches.
+  virtual void find(HeightLayer& layer, std::size_t contributor, std::span<const std::uint32_t> which) = 0;
 
  protected:
   Batch(double wanted, std::span<double> m, std::span<double> s) : wanted_spacing(wanted), metres(m), spacings(s) {}
@@ -108,7 +214,7 @@ struct ElevationModel::PlaceBatch final : Batch {
   PlaceBatch(std::span<const geo::LatLon> p, std::vector<geo::LatLon>& room, double wanted, std::span<double> m, std::span<double> s)
       : Batch(wanted, m, s), places(p), inside_places(room) {}
 
-  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
+  void find(HeightLayer& layer, std::size_t, std::span<const std::uint32_t> which) override {
     LayerSamples& out = layer.samples;
     inside_places.clear();
     for (const std::uint32_t i : which) {
@@ -126,8 +232,8 @@ struct ElevationModel::PlaceBatch final : Batch {
 
 /// Some rows of a lattice.
 struct ElevationModel::LatticeBatch final : Batch {
-  LatticeBatch(const TileLattice& lattice, std::size_t layer_count, std::vector<glm::dvec2>& r, double wanted)
-      : Batch(wanted, {}, {}), points(lattice), in_layers(layer_count), room(r) {}
+  LatticeBatch(const TileLattice& lattice, std::size_t contributors, std::vector<glm::dvec2>& r, double wanted)
+      : Batch(wanted, {}, {}), points(lattice), in_rasters(contributors), room(r) {}
 
   void choose_rows(int first, std::span<double> m, std::span<double> s) {
     first_row = first;
@@ -135,11 +241,11 @@ struct ElevationModel::LatticeBatch final : Batch {
     spacings = s;
   }
 
-  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
+  void find(HeightLayer& layer, std::size_t contributor, std::span<const std::uint32_t> which) override {
     if (!overlap(points.bounds(), layer.reach)) return;
     const source::RasterDescription& raster = layer.raster.description();
     const int level = level_for_spacing(raster, wanted_spacing);
-    std::optional<LatticePixels::InRaster>& in_raster = in_layers[layer.number];
+    std::optional<LatticePixels::InRaster>& in_raster = in_rasters[contributor];
     if (!in_raster) in_raster = points.in_raster(layer.raster.reader(), raster, level);
     room.resize(metres.size());
     in_raster->rows(first_row, room);
@@ -158,21 +264,24 @@ struct ElevationModel::LatticeBatch final : Batch {
 
   int first_row = 0;
   LatticePixels points;
-  std::vector<std::optional<LatticePixels::InRaster>> in_layers;
+  std::vector<std::optional<LatticePixels::InRaster>> in_rasters;  ///< of the contributors
   std::vector<glm::dvec2>& room;
 };
 
 bool ElevationModel::is_pending() const {
-  return std::any_of(layers_.begin(), layers_.end(), [](const auto& layer) { return layer.raster.is_pending(); });
+  const auto waits = [](const auto& entry) { return entry.second.raster.is_pending(); };
+  return std::ranges::any_of(layers_, waits) || std::ranges::any_of(data_sets_, waits);
 }
 
 bool ElevationModel::take_pending(source::Awaited& awaited) {
   bool pending = false;
-  for (HeightLayer& layer : layers_) {
-    if (!layer.raster.take_pending(awaited)) continue;
+  const auto take = [&](HeightLayer& layer) {
+    if (!layer.raster.take_pending(awaited)) return;
     pending = true;
     layer.beyond.clear();  // may have been made of zeros
-  }
+  };
+  for (auto& [settings, layer] : layers_) take(layer);
+  for (auto& [id, layer] : data_sets_) take(layer);
   return pending;
 }
 
@@ -199,8 +308,9 @@ Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double
   for (std::size_t first = 0; first < places.size(); first += kPlacesAtOnce) {
     const std::size_t count = std::min(kPlacesAtOnce, places.size() - first);
     spacings_.resize(count);
+    choose(places.subspan(first, count), wanted_spacing);
     PlaceBatch batch(places.subspan(first, count), inside_places_, wanted_spacing, metres.subspan(first, count), spacings_);
-    if (Result<void> composed = compose(batch, layers_.size(), all_of(count)); !composed) return composed;
+    if (Result<void> composed = compose(batch, contributors_.size(), all_of(count)); !composed) return composed;
   }
   return {};
 }
@@ -208,37 +318,40 @@ Result<void> ElevationModel::heights(std::span<const geo::LatLon> places, double
 Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_spacing, std::span<double> metres) {
   assert(metres.size() == static_cast<std::size_t>(lattice.side) * static_cast<std::size_t>(lattice.side));
   const int rows_at_once = std::max(1, static_cast<int>(kPlacesAtOnce) / lattice.side);
-  LatticeBatch batch(lattice, layers_.size(), lattice_pixels_, wanted_spacing);
+  choose(region_of(lattice), wanted_spacing);
+  LatticeBatch batch(lattice, contributors_.size(), lattice_pixels_, wanted_spacing);
   for (int row = 0; row < lattice.side; row += rows_at_once) {
     const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(lattice.side);
     const auto count = static_cast<std::size_t>(std::min(rows_at_once, lattice.side - row)) * static_cast<std::size_t>(lattice.side);
     spacings_.resize(count);
     batch.choose_rows(row, metres.subspan(first, count), spacings_);
-    if (Result<void> composed = compose(batch, layers_.size(), all_of(count)); !composed) return composed;
+    if (Result<void> composed = compose(batch, contributors_.size(), all_of(count)); !composed) return composed;
   }
   return {};
 }
 
-/// Heights at the places `which`, by the lowest `layer_count` layers. Layers below are asked only where the uppermost of these
-/// does not hide them.
-Result<void> ElevationModel::compose(Batch& batch, std::size_t layer_count, std::span<const std::uint32_t> which) {
+/// Heights at the places `which`, by the lowest `count` contributors. Those below are asked, and opened, only where the uppermost of
+/// these does not hide them.
+Result<void> ElevationModel::compose(Batch& batch, std::size_t count, std::span<const std::uint32_t> which) {
   if (which.empty()) return {};
-  if (layer_count == 0) {
+  if (count == 0) {
     for (const std::uint32_t i : which) {
       batch.metres[i] = 0.0;
       batch.spacings[i] = std::numeric_limits<double>::infinity();
     }
     return {};
   }
-  HeightLayer& layer = layers_[layer_count - 1];
+  HeightLayer* opened = open(contributors_[count - 1]);
+  if (opened == nullptr) return compose(batch, count - 1, which);
+  HeightLayer& layer = *opened;
   LayerSamples& samples = layer.samples;
   samples.inside.clear();
   samples.pixels.clear();
-  batch.find(layer, which);
-  if (samples.inside.empty()) return compose(batch, layer_count - 1, which);
+  batch.find(layer, count - 1, which);
+  if (samples.inside.empty()) return compose(batch, count - 1, which);
 
   const int level = level_for_spacing(layer.raster.description(), batch.wanted_spacing);
-  const bool adds = layer.settings->adds;
+  const bool adds = contributors_[count - 1].settings->adds;
   samples.heights.resize(samples.inside.size());
   if (Result<void> read = layer.raster.sample_heights(level, samples.pixels, samples.heights); !read) return read;
 
@@ -261,8 +374,9 @@ Result<void> ElevationModel::compose(Batch& batch, std::size_t layer_count, std:
     }
     ++n;
   }
-  if (Result<void> composed = compose(batch, layer_count - 1, samples.below); !composed) return composed;
-  if (!adds) {
+  if (Result<void> composed = compose(batch, count - 1, samples.below); !composed) return composed;
+  // Voids of a catalogue's rasters show what lies below: filled from their own coarser levels, neighbours would not meet.
+  if (!adds && !contributors_[count - 1].settings->catalogue) {
     if (Result<void> filled = fill_voids(layer, level, batch.spacings); !filled) return filled;
   }
   for (const std::uint32_t open : samples.open) {
@@ -328,12 +442,22 @@ Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
 Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Lookup lookup, double wanted_spacing) {
   ElevationAnswer answer{0.0, std::numeric_limits<double>::infinity()};
   if (lookup == Lookup::bilinear) {
+    choose(std::span(&place, 1), wanted_spacing);
     PlaceBatch batch({&place, 1}, inside_places_, wanted_spacing, {&answer.metres, 1}, {&answer.spacing, 1});
-    const Result<void> read = compose(batch, layers_.size(), all_of(1));
+    const Result<void> read = compose(batch, contributors_.size(), all_of(1));
     return read ? Result<ElevationAnswer>(answer) : read.error();
   }
-  for (HeightLayer& layer : layers_) {
-    if (!holds(layer.reach, place)) continue;
+  choose(std::span(&place, 1), wanted_spacing);
+  struct Answered {
+    cache::HeightSample sample;
+    bool adds;
+    double spacing;
+  };
+  std::vector<Answered> from_the_top;
+  for (Contributor& contributor : std::views::reverse(contributors_)) {
+    HeightLayer* opened = open(contributor);
+    if (opened == nullptr || !holds(opened->reach, place)) continue;
+    HeightLayer& layer = *opened;
     const source::RasterDescription& raster = layer.raster.description();
     const int level = level_for_spacing(raster, wanted_spacing);
     glm::dvec2 pixel;
@@ -348,8 +472,13 @@ Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Look
     pixel = (glm::min(glm::floor(pixel * scale), last) + 0.5) / scale;
     cache::HeightSample sample;
     if (Result<void> read = layer.raster.sample_heights(level, {&pixel, 1}, {&sample, 1}); !read) return read.error();
-    compose_one(answer.metres, sample, layer.settings->adds);
-    if (sample.coverage > 0.0) answer.spacing = std::min(answer.spacing, spacing_of_level(raster, level));
+    const bool adds = contributor.settings->adds;
+    if (sample.coverage > 0.0) from_the_top.push_back({sample, adds, spacing_of_level(raster, level)});
+    if (sample.coverage >= 1.0 && !adds) break;  // hides what lies below
+  }
+  for (const Answered& answered : std::views::reverse(from_the_top)) {
+    compose_one(answer.metres, answered.sample, answered.adds);
+    answer.spacing = std::min(answer.spacing, answered.spacing);
   }
   return answer;
 }

@@ -3,15 +3,19 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <list>
 #include <memory>
 #include <span>
 #include <stop_token>
+#include <unordered_map>
 #include <vector>
 
 #include "base/result.h"
 #include "cache/cached_raster.h"
 #include "geo/ellipsoid.h"
 #include "geo/tile_key.h"
+#include "source/catalogue/catalogue.h"
 #include "source/raster_source.h"
 #include "surface/coarse_heights.h"
 #include "surface/tile_content.h"
@@ -19,10 +23,12 @@
 
 namespace tellurion::surface {
 
-/// A layer of a group as the surface sees it: a source and its settings. Immutable. Lowest layer first in every list.
+/// A layer of a group as the surface sees it: a source, or a catalogue of many, and its settings. Immutable. Lowest layer first in
+/// every list.
 struct Layer {
   std::string name;
   std::shared_ptr<const source::RasterSource> source;
+  std::shared_ptr<const source::Catalogue> catalogue{};  ///< instead of `source`
   std::uint32_t source_id = 0;   ///< number in the block cache's keys
   bool enabled = true;
   float opacity = 1.0f;
@@ -31,6 +37,15 @@ struct Layer {
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
   ImageUse use = ImageUse::colour;  ///< image layers: what they are drawn into
 };
+
+/// Where the layer has data.
+inline const source::Coverage& coverage_of(const Layer& layer) {
+  return layer.catalogue ? static_cast<const source::Coverage&>(*layer.catalogue) : layer.source->coverage();
+}
+
+/// Data sets of a catalogue narrower than this many samples or texels of what is built are left out of it: from afar they are
+/// specks, and there may be thousands.
+inline constexpr double kNarrowestDataSet = 16.0;
 
 /// The coarsest level of a layer that fills its voids: 64 samples across.
 inline constexpr int kCoarsestFill = 6;
@@ -54,7 +69,8 @@ struct ElevationAnswer {
 /// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
 /// continuous across voids and borders; 0 where there is nothing. A void inside a layer shows the finest data that there are:
 /// the layer's own coarser levels, made of the samples round the void, as long as they are finer than the layers below (not
-/// beyond level kCoarsestFill); then those layers. So a hole in a mountain's samples is no pit down to a coarse globe.
+/// beyond level kCoarsestFill); then those layers. So a hole in a mountain's samples is no pit down to a coarse globe. Voids of a
+/// catalogue's rasters show what lies below them.
 class ElevationModel {
  public:
   static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
@@ -79,10 +95,10 @@ class ElevationModel {
   /// Whether it would say yes: what was read will be thrown away.
   bool is_pending() const;
 
-  /// The enabled height layers' rasters, lowest first, and the settings of each.
-  std::size_t layer_count() const { return layers_.size(); }
-  const Layer& layer(std::size_t i) const { return *layers_[i].settings; }
-  cache::CachedRaster& raster(std::size_t i) { return layers_[i].raster; }
+  /// Calls `visit` with each raster of the enabled layers that touches the tile, lowest first, and the finest distance between its samples
+  /// there. Ends with the first error.
+  using Visit = std::function<Result<void>(cache::CachedRaster&, Metres spacing)>;
+  Result<void> for_each_under(const geo::TileKey& key, const Visit& visit);
 
  private:
   /// What one layer says at the places of a batch that it reaches. The vectors are kept between calls.
@@ -97,13 +113,19 @@ class ElevationModel {
     std::vector<glm::dvec2> void_pixels;
     std::vector<cache::HeightSample> void_heights;
   };
+  /// An open raster: a layer's, or one of a catalogue.
   struct HeightLayer {
-    const Layer* settings;
-    std::size_t number;                ///< among the model's layers
+    std::shared_ptr<const source::RasterSource> source;
     cache::CachedRaster raster;
     geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
     std::vector<CoarseHeights> beyond; ///< levels after the raster's last, made when a void asks for them
     LayerSamples samples;
+  };
+  /// A raster that may contribute to the batch at hand.
+  struct Contributor {
+    const Layer* settings = nullptr;
+    HeightLayer* raster = nullptr;     ///< null: of a catalogue, not opened yet
+    std::uint32_t index = 0;           ///< in its catalogue
   };
   struct Batch;
   struct PlaceBatch;
@@ -111,13 +133,24 @@ class ElevationModel {
 
   ElevationModel() = default;
 
-  Result<void> compose(Batch& batch, std::size_t layer_count, std::span<const std::uint32_t> which);
+  void choose(const source::FaceRegion& region, double wanted_spacing);
+  void choose(std::span<const geo::LatLon> places, double wanted_spacing);
+  HeightLayer* open(Contributor& contributor);
+  HeightLayer* open_data_set(const source::Catalogue& catalogue, std::uint32_t index);
+  void close_unused();
+  Result<void> compose(Batch& batch, std::size_t count, std::span<const std::uint32_t> which);
   Result<void> fill_voids(HeightLayer& layer, int level, std::span<double> spacings);
   Result<void> sample_voids(HeightLayer& layer, int level);
   std::span<const std::uint32_t> all_of(std::size_t count);
 
   std::shared_ptr<const SurfaceDescription> description_;
-  std::vector<HeightLayer> layers_;
+  cache::BlockCache* cache_ = nullptr;
+  bool has_catalogue_ = false;
+  std::unordered_map<const Layer*, HeightLayer> layers_;  ///< those of one source
+  std::list<std::pair<std::uint32_t, HeightLayer>> data_sets_;  ///< open ones of catalogues by their number, the last used first
+  std::unordered_map<std::uint32_t, std::list<std::pair<std::uint32_t, HeightLayer>>::iterator> data_set_index_;
+  std::vector<Contributor> contributors_;  ///< to the batch at hand, lowest first
+  std::vector<std::uint32_t> found_;
   // Kept between calls: one allocation serves all batches.
   std::vector<geo::LatLon> places_;
   std::vector<geo::LatLon> inside_places_;

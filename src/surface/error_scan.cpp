@@ -178,13 +178,11 @@ class Scanner {
     const geo::TileKey& key = path_.back().key;
     const double finest = finest_spacing(model_.description().heights, key);
     bool some_raster_ends = false;
-    for (std::size_t i = 0; i < model_.layer_count(); ++i) {
-      const source::RasterSource& source = *model_.layer(i).source;
-      if (!source.coverage().touches(key)) continue;
-      const bool is_finest = source.coverage().spacing_under(key).value <= finest;
-      if (Result<void> scanned = scan_raster(model_.raster(i), is_finest); !scanned) return scanned;
-      some_raster_ends = some_raster_ends || !source.description().wraps;
-    }
+    const Result<void> all = model_.for_each_under(key, [&](cache::CachedRaster& raster, Metres spacing) {
+      some_raster_ends = some_raster_ends || !raster.description().wraps;
+      return scan_raster(raster, spacing.value <= finest);
+    });
+    if (!all) return all;
     if (Result<void> compared = compare_half_steps(some_raster_ends); !compared) return compared;
     if (some_raster_ends) {
       // Where rasters are blended, heights between the places may lie beyond those found.
@@ -363,6 +361,7 @@ class Scanner {
 }  // namespace
 
 bool is_scanned(const Layer& layer) {
+  if (layer.catalogue) return false;
   const source::LevelSize& size = layer.source->description().levels.front();
   return layer.enabled && !layer.source->description().is_remote && static_cast<double>(size.width) * size.height <= kMostScannedSamples;
 }
@@ -370,8 +369,7 @@ bool is_scanned(const Layer& layer) {
 double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
   double finest = std::numeric_limits<double>::infinity();
   for (const Layer& layer : layers) {
-    if (!layer.enabled || !layer.source->coverage().touches(key)) continue;
-    finest = std::min(finest, layer.source->coverage().spacing_under(key).value);
+    if (layer.enabled) finest = std::min(finest, coverage_of(layer).spacing_under(key).value);
   }
   return finest;
 }

@@ -31,13 +31,14 @@ struct Range {
 /// The samples of all layers within the tile.
 Result<void> add_samples(ElevationModel& model, const geo::TileKey& key, FinestHeights& finest) {
   std::vector<geo::LatLon> places;
-  for (std::size_t i = 0; i < model.layer_count(); ++i) {
-    if (!model.layer(i).source->coverage().touches(key)) continue;
-    for (const TileSample& sample : samples_under(model.raster(i).reader(), model.raster(i).description(), key)) {
+  const Result<void> visited = model.for_each_under(key, [&](cache::CachedRaster& raster, Metres) -> Result<void> {
+    for (const TileSample& sample : samples_under(raster.reader(), raster.description(), key)) {
       places.push_back(sample.place);
       finest.places.push_back(sample.st * static_cast<double>(kCells));
     }
-  }
+    return {};
+  });
+  if (!visited) return visited;
   finest.samples.resize(places.size());
   return model.heights(places, 0.0, finest.samples);
 }

@@ -14,6 +14,7 @@
 #include <glm/common.hpp>
 
 #include "surface/control_grid.h"
+#include "surface/tile_grid.h"
 
 namespace tellurion::surface {
 namespace {
@@ -22,6 +23,7 @@ namespace {
 struct ClosedSides {
   bool top = false;
   bool bottom = false;
+  int kept = 0;   ///< pixels beyond the other sides that repeat the border, so that neighbours of a mosaic meet
 };
 
 ClosedSides closed_sides(const source::RasterDescription& raster, source::RasterReader& reader) {
@@ -34,7 +36,7 @@ ClosedSides closed_sides(const source::RasterDescription& raster, source::Raster
     return std::all_of(places.begin(), places.end(),
                        [&](const geo::LatLon& p) { return std::cos(p.latitude.value) < 0.5 * step; });
   };
-  return {is_pole(0.0), is_pole(size.height)};
+  return {is_pole(0.0), is_pole(size.height), 0};
 }
 
 /// A window of a level, to be reduced by whole factors on each axis after reading.
@@ -116,7 +118,7 @@ void clear_outside(raster::Image& image, const source::PixelWindow& window, cons
                    const ClosedSides& closed) {
   for (int j = 0; j < window.height; ++j) {
     const int y = window.y + j;
-    const bool row_outside = (y < 0 && !closed.top) || (y >= size.height && !closed.bottom);
+    const bool row_outside = (y < -closed.kept && !closed.top) || (y >= size.height + closed.kept && !closed.bottom);
     const auto row = image.rgba.begin() + static_cast<std::ptrdiff_t>(image.offset(0, j));
     const auto clear = [&](int from, int to) {
       if (from < to) std::fill(row + 4 * from, row + 4 * to, std::uint8_t{0});
@@ -124,8 +126,8 @@ void clear_outside(raster::Image& image, const source::PixelWindow& window, cons
     if (row_outside) {
       clear(0, window.width);
     } else if (!wraps) {
-      clear(0, std::clamp(-window.x, 0, window.width));
-      clear(std::clamp(size.width - window.x, 0, window.width), window.width);
+      clear(0, std::clamp(-closed.kept - window.x, 0, window.width));
+      clear(std::clamp(size.width + closed.kept - window.x, 0, window.width), window.width);
     }
   }
 }
@@ -286,45 +288,69 @@ Result<ImagePatch> make_patch(cache::CachedRaster& raster, const geo::TileKey& k
 
 Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache) {
   ColourModel model;
+  model.cache_ = &cache;
   for (const Layer& layer : description->colours) {
     if (!layer.enabled) continue;
+    ColourLayer& opened = model.layers_.emplace_back(ColourLayer{&layer, {}});
+    if (layer.catalogue) continue;
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
-    model.layers_.push_back({&layer, std::move(raster).value()});
+    opened.rasters.push_back({layer.source_id, layer.source, std::move(raster).value()});
   }
   model.description_ = std::move(description);
   return model;
 }
 
+Result<cache::CachedRaster*> ColourModel::open_data_set(ColourLayer& layer, std::uint32_t index) {
+  constexpr std::size_t kMostOpen = 64;
+  const source::Catalogue& catalogue = *layer.settings->catalogue;
+  const std::uint32_t id = catalogue.sets()[index]->id;
+  if (const auto held = std::ranges::find(layer.rasters, id, &OpenRaster::id); held != layer.rasters.end()) {
+    layer.rasters.splice(layer.rasters.begin(), layer.rasters, held);
+    return &layer.rasters.front().raster;
+  }
+  auto source = catalogue.open(index);
+  if (!source) return source.error();
+  Result<cache::CachedRaster> raster = cache::CachedRaster::open(**source, *cache_, id);
+  if (!raster) return raster.error();
+  layer.rasters.push_front({id, std::move(*source), std::move(raster).value()});
+  if (layer.rasters.size() > kMostOpen && !layer.rasters.back().raster.is_pending()) layer.rasters.pop_back();
+  return &layer.rasters.front().raster;
+}
+
 bool ColourModel::take_pending(source::Awaited& awaited) {
   bool pending = false;
-  for (ColourLayer& layer : layers_) pending = layer.raster.take_pending(awaited) || pending;
+  for (ColourLayer& layer : layers_) {
+    for (OpenRaster& open : layer.rasters) pending = open.raster.take_pending(awaited) || pending;
+  }
   return pending;
 }
 
-Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
-  std::vector<ImagePatch> from_the_top;
-  std::vector<MissingLayer> missing;
-  std::array<bool, kImageUses> hidden{};  // what lies further down, of each use
-  const bool& colours_hidden = hidden[static_cast<std::size_t>(ImageUse::colour)];
-  bool pending = false;
-  for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
-    const Layer& settings = *layer->settings;
-    bool& hidden_below = hidden[static_cast<std::size_t>(settings.use)];
-    if (hidden_below || (settings.use == ImageUse::grayscale && colours_hidden) || !settings.source->coverage().touches(key)) continue;
-    source::RasterReader& reader = layer->raster.reader();
-    const SlotMapping mapping = map_slot(model.description().ellipsoid, key, layer->raster.description(), reader);
-    const ClosedSides closed = closed_sides(layer->raster.description(), reader);
+namespace {
+
+/// A tile's imagery while it is made, from the uppermost layer down.
+class Composition {
+ public:
+  Composition(const geo::Ellipsoid& world, const geo::TileKey& key, std::stop_token stop) : world_(world), key_(key), stop_(std::move(stop)) {}
+
+  bool is_hidden(ImageUse use) const { return hidden(use) || (use == ImageUse::grayscale && hidden(ImageUse::colour)); }
+
+  /// Errors: cancelled. What cannot be read is left out.
+  Result<void> add(const Layer& settings, std::uint32_t source_id, cache::CachedRaster& raster) {
+    source::RasterReader& reader = raster.reader();
+    const SlotMapping mapping = map_slot(world_, key_, raster.description(), reader);
+    ClosedSides closed = closed_sides(raster.description(), reader);
+    if (settings.catalogue) closed.kept = 1;
     bool hides_all_below = mapping.whole;
     for (const ControlGrid& grid : mapping.grids) {
-      if (stop.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key)};
-      Result<ImagePatch> patch = make_patch(layer->raster, key, grid, closed);
+      if (stop_.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key_)};
+      Result<ImagePatch> patch = make_patch(raster, key_, grid, closed);
       if (!patch && patch.error().code == ErrorCode::pending) {
-        pending = true;  // taken for opaque: what lies below is asked for once it shows
+        pending_ = true;  // taken for opaque: what lies below is asked for once it shows
         continue;
       }
       if (!patch) {
-        missing.push_back({settings.source_id, patch.error()});
+        add_missing(source_id, patch.error());
         hides_all_below = false;
         break;
       }
@@ -338,17 +364,71 @@ Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, s
       patch->use = settings.use;
       patch->opaque = patch->opaque && settings.opacity >= 1.0f;
       hides_all_below = hides_all_below && patch->opaque;
-      from_the_top.push_back(std::move(patch).value());
+      from_the_top_.push_back(std::move(patch).value());
     }
-    hidden_below = hides_all_below;
+    hidden_[static_cast<std::size_t>(settings.use)] = hides_all_below;
+    return {};
   }
-  if (pending) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};
-  TileImagery imagery;
-  for (ImagePatch& patch : std::views::reverse(from_the_top)) list_of(patch.use, imagery).push_back(std::move(patch));
-  drop_dark(imagery.effects);
-  std::erase_if(imagery.overlays, [](const ImagePatch& patch) { return is_clear(patch.image); });
-  imagery.missing = std::move(missing);
-  return imagery;
+
+  void add_missing(std::uint32_t source_id, Error error) { missing_.push_back({source_id, std::move(error)}); }
+
+  Result<TileImagery> finish() {
+    if (pending_) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key_)};
+    TileImagery imagery;
+    for (ImagePatch& patch : std::views::reverse(from_the_top_)) list_of(patch.use, imagery).push_back(std::move(patch));
+    drop_dark(imagery.effects);
+    std::erase_if(imagery.overlays, [](const ImagePatch& patch) { return is_clear(patch.image); });
+    imagery.missing = std::move(missing_);
+    return imagery;
+  }
+
+ private:
+  bool hidden(ImageUse use) const { return hidden_[static_cast<std::size_t>(use)]; }
+
+  const geo::Ellipsoid& world_;
+  geo::TileKey key_;
+  std::stop_token stop_;
+  std::vector<ImagePatch> from_the_top_;
+  std::vector<MissingLayer> missing_;
+  std::array<bool, kImageUses> hidden_{};  ///< what lies further down, of each use
+  bool pending_ = false;
+};
+
+/// The tile's slot, gutters included.
+source::FaceRegion slot_region(const geo::TileKey& key) {
+  const geo::FaceRect rect = geo::face_rect(key);
+  const glm::dvec2 gutter = (rect.upper - rect.lower) * (static_cast<double>(kColourGutter) / (kColourSlotSide - 2 * kColourGutter));
+  return source::region_of(key.face, {rect.lower - gutter, rect.upper + gutter});
+}
+
+}  // namespace
+
+Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
+  const geo::Ellipsoid& world = model.description().ellipsoid;
+  Composition composition(world, key, std::move(stop));
+  const Radians narrowest(kNarrowestDataSet * nominal_colour_texel(world, key.level) / world.a());
+  std::vector<std::uint32_t> found;
+  for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {
+    const Layer& settings = *layer->settings;
+    if (composition.is_hidden(settings.use) || !coverage_of(settings).touches(key)) continue;
+    if (!settings.catalogue) {
+      if (Result<void> added = composition.add(settings, settings.source_id, layer->rasters.front().raster); !added) return added.error();
+      continue;
+    }
+    settings.catalogue->find(slot_region(key), narrowest, found);
+    for (const std::uint32_t index : found) {
+      if (composition.is_hidden(settings.use)) break;
+      const Result<cache::CachedRaster*> raster = model.open_data_set(*layer, index);
+      const std::uint32_t id = settings.catalogue->sets()[index]->id;
+      if (!raster) {
+        // What will never be there is no reason to ask for the tile again: the catalogue tells of it.
+        if (raster.error().code == ErrorCode::unavailable) composition.add_missing(id, raster.error());
+        continue;
+      }
+      if (Result<void> added = composition.add(settings, id, **raster); !added) return added.error();
+    }
+  }
+  return composition.finish();
 }
 
 }  // namespace tellurion::surface

@@ -2,8 +2,11 @@
 // A job of a worker: values and a stop token in, a result out.
 #pragma once
 
+#include <cstdint>
+#include <list>
 #include <memory>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
@@ -26,14 +29,23 @@ class ColourModel {
  private:
   friend Result<TileImagery> build_imagery(ColourModel&, const geo::TileKey&, std::stop_token);
 
+  /// An open raster: a layer's, or one of a catalogue.
+  struct OpenRaster {
+    std::uint32_t id;
+    std::shared_ptr<const source::RasterSource> source;
+    cache::CachedRaster raster;
+  };
   struct ColourLayer {
     const Layer* settings;
-    cache::CachedRaster raster;
+    std::list<OpenRaster> rasters;   ///< that of its source, or the open ones of its catalogue, the last used first
   };
 
   ColourModel() = default;
+  /// Errors: those of opening.
+  Result<cache::CachedRaster*> open_data_set(ColourLayer& layer, std::uint32_t index);
 
   std::shared_ptr<const SurfaceDescription> description_;
+  cache::BlockCache* cache_ = nullptr;
   std::vector<ColourLayer> layers_;
 };
 

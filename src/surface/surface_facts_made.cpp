@@ -26,8 +26,8 @@ class MadeFacts final : public SurfaceFacts {
     bool assumed = false;
     double finest_height = std::numeric_limits<double>::infinity();
     for (const Layer& layer : description_->heights) {
-      if (!layer.enabled || !layer.source->coverage().touches(key)) continue;
-      finest_height = std::min(finest_height, layer.source->coverage().spacing_under(key).value);
+      if (!layer.enabled || !coverage_of(layer).touches(key)) continue;
+      finest_height = std::min(finest_height, coverage_of(layer).spacing_under(key).value);
       assumed = assumed || !table_ || !is_scanned(layer);
     }
     if (table_) {
@@ -53,7 +53,7 @@ class MadeFacts final : public SurfaceFacts {
     facts.own_colour = key.level == 0 || finest_colour < kClearlyFiner * 2.0 * colour_texel;
     const auto has_any_of = [&](std::initializer_list<ImageUse> uses) {
       return facts.own_colour && std::ranges::any_of(description_->colours, [&](const Layer& layer) {
-               return layer.enabled && std::ranges::find(uses, layer.use) != uses.end() && layer.source->coverage().touches(key);
+               return layer.enabled && std::ranges::find(uses, layer.use) != uses.end() && coverage_of(layer).touches(key);
              });
     };
     facts.own_effects = has_any_of({ImageUse::night, ImageUse::water});

@@ -88,7 +88,7 @@ TEST_CASE("SlotAges: slots that a changed layer touches are composed anew, once,
   const geo::TileKey root{0, 0, 0, 0}, other{1, 0, 0, 0};
   const std::vector<surface::DrawTile> drawn{{.key = root, .colour_owner = root, .colour_before = root, .slope_owner = root}};
   const SlotAges::TimePoint start{};
-  SlotAges slots;
+  SlotAges slots(surface::Part::colour);
   slots.composed(root, true);
   slots.composed(other, true);
   CHECK_FALSE(slots.find(drawn, start).any);
@@ -119,7 +119,7 @@ TEST_CASE("SlotAges: a slot lacks a layer only where nothing that is shown has i
   const geo::TileKey root{0, 0, 0, 0}, child{0, 1, 0, 0}, grandchild{0, 2, 0, 0};
   const std::vector<surface::DrawTile> drawn{{.key = root, .colour_owner = root, .colour_before = root, .slope_owner = root}};
   const SlotAges::TimePoint start{};
-  SlotAges slots;
+  SlotAges slots(surface::Part::colour);
   CHECK(slots.may_lack(root, {3}));
   slots.composed_without(root, {3, 5}, start + std::chrono::seconds(5));
   CHECK(slots.may_lack(grandchild, {3}));

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <chrono>
 #include <cmath>
+#include <mutex>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,10 +25,18 @@ namespace {
 
 class GdalSource final : public RasterSource {
  public:
-  GdalSource(std::shared_ptr<const GdalLayout> layout, GridCoverage coverage) : layout_(std::move(layout)), coverage_(std::move(coverage)) {}
+  GdalSource(std::shared_ptr<const GdalLayout> layout, const PixelRange& reach) : layout_(std::move(layout)), reach_(reach) {}
 
   const RasterDescription& description() const override { return layout_->description; }
-  const Coverage& coverage() const override { return coverage_; }
+  /// Found when first asked for: it takes most of the time of opening, and the data sets of a catalogue have a footprint instead.
+  const Coverage& coverage() const override {
+    std::call_once(coverage_once_, [this] {
+      Result<PixelMapping> mapping = PixelMapping::create(layout_->georeference, layout_->world);
+      assert(mapping);  // it could be made when the raster was opened
+      coverage_.emplace(reach_, layout_->world, [&](std::span<const glm::dvec2> pixels, std::span<geo::LatLon> places) { mapping->to_places(pixels, places); });
+    });
+    return *coverage_;
+  }
   std::string revision() const override { return layout_->revision; }
   Result<std::unique_ptr<RasterReader>> open_reader() const override {
     Result<std::unique_ptr<GdalReader>> reader = GdalReader::open(layout_);
@@ -35,7 +46,9 @@ class GdalSource final : public RasterSource {
 
  private:
   std::shared_ptr<const GdalLayout> layout_;
-  GridCoverage coverage_;
+  PixelRange reach_;
+  mutable std::once_flag coverage_once_;
+  mutable std::optional<GridCoverage> coverage_;
 };
 
 Error naming(const GdalOptions& options, const Error& error) { return {error.code, fmt::format("{}: {}", options.path, error.message)}; }
@@ -104,8 +117,7 @@ Result<std::unique_ptr<RasterSource>> make_source(GdalLayout inspected) {
   const glm::dvec2 size(layout->georeference.width, layout->georeference.height);
   about.bounds = bounds_of({glm::max(reach.lower, glm::dvec2(0.0)), glm::min(reach.upper, size)}, to_places);
   about.spacing = spacing_at(0.5 * size, world, to_places);
-  GridCoverage coverage(reach, world, to_places);
-  return std::unique_ptr<RasterSource>(std::make_unique<GdalSource>(std::move(layout), std::move(coverage)));
+  return std::unique_ptr<RasterSource>(std::make_unique<GdalSource>(std::move(layout), reach));
 }
 
 /// What a remote raster needs beyond a local one: none of its levels may be made of a large part of the file.
