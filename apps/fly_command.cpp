@@ -78,7 +78,7 @@ void keep_memory_flat() {
 #endif
 }
 
-/// The same for smaller ones, between pictures.
+/// The same for smaller ones: what loading has left, before the picture is drawn.
 void give_memory_back() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -121,6 +121,7 @@ int fly(const FlyOptions& options) {
       const bool finished = (*view)->finish(camera, settings, deadline);
       complete &= finished;
       if (finished) ground.check(flight->pose_at(flight->start_s() + elapsed).position, options.view.exaggeration);  // by data that the picture has brought
+      give_memory_back();
     }
     globe::FrameStats stats = frames.draw(camera, settings);
     stats.frame = frame;
@@ -133,7 +134,6 @@ int fly(const FlyOptions& options) {
       if (const auto added = sink->add((*view)->last_picture(), frame); !added) return report(added.error());
     }
     show_progress(frame + 1, count);
-    if (!options.realtime) give_memory_back();
   }
   summary.load_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   summary.sources = (*globe)->source_stats();

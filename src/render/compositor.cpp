@@ -179,11 +179,16 @@ Compositor::Scratch& Compositor::scratch_for(gpu::RenderThread& thread, const ra
     return s;
   }
   const Scratch wanted{width, height, use_, gpu::Texture()};
+  const std::size_t count_before = scratch_.size();
   while (scratch_.size() == kMaxScratch || (!scratch_.empty() && !budget.fits(wanted.bytes()))) {
     const auto oldest = std::min_element(scratch_.begin(), scratch_.end(),
                                          [](const Scratch& a, const Scratch& b) { return a.last_use < b.last_use; });
     budget.used -= oldest->bytes();
     scratch_.erase(oldest);
+  }
+  if (scratch_.size() < count_before) {
+    thread.empty_graveyard();  // else those of many patches would pile up until the next frame
+    glFlush();                 // and until the driver draws what reads them
   }
   Scratch& s = scratch_.emplace_back(Scratch{width, height, use_, gpu::Texture(thread)});
   budget.used += s.bytes();

@@ -39,13 +39,14 @@ std::optional<Slot> SlotPool::acquire(const gpu::RenderThread& thread, Budget& b
   Array array{gpu::Texture(thread), layers, {}};
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D_ARRAY, array.texture.name());
+  // Before the images: a driver allocates a whole chain of levels for a filter that asks for it, and that is a new texture's.
+  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, format_.levels - 1);
+  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, format_.min_filter);
   for (int level = 0; level < format_.levels; ++level) {
     const int side = std::max(format_.side >> level, 1);
     glTexImage3D(GL_TEXTURE_2D_ARRAY, level, static_cast<GLint>(format_.internal), side, side, static_cast<GLsizei>(layers),
                  0, format_.external, format_.type, nullptr);
   }
-  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, format_.levels - 1);
-  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, format_.min_filter);
   glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
@@ -58,7 +59,7 @@ std::optional<Slot> SlotPool::acquire(const gpu::RenderThread& thread, Budget& b
   return Slot{static_cast<std::uint32_t>(place - arrays_.begin()), 0};
 }
 
-bool SlotPool::give_back(Budget& budget) {
+bool SlotPool::give_back(gpu::RenderThread& thread, Budget& budget) {
   bool given = false;
   for (Array& array : arrays_) {
     if (array.layers == 0 || array.free_layers.size() < array.layers) continue;
@@ -67,6 +68,7 @@ bool SlotPool::give_back(Budget& budget) {
     array = Array{};
     given = true;
   }
+  if (given) thread.empty_graveyard();  // else new ones would stand beside them until the next frame
   return given;
 }
 

@@ -38,8 +38,8 @@ class SlotPool {
   /// A free slot of undefined content; nothing if there is neither one nor room for more.
   std::optional<Slot> acquire(const gpu::RenderThread& thread, Budget& budget);
   void release(Slot slot);
-  /// Frees the arrays that have no slot in use; true if there were any.
-  bool give_back(Budget& budget);
+  /// Frees the arrays that have no slot in use, at once; true if there were any.
+  bool give_back(gpu::RenderThread& thread, Budget& budget);
 
   unsigned texture(Slot slot) const { return arrays_[slot.array].texture.name(); }
   const SlotFormat& format() const { return format_; }

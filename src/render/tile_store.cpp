@@ -79,21 +79,21 @@ Result<void> TileStore::warm_up(gpu::RenderThread& thread) {
   return compositor_.compose_effects(thread, patches, pool, *slot, budget_);
 }
 
-bool TileStore::has_room(std::size_t bytes) {
-  return budget_.fits(bytes) || (colours_.give_back(budget_) && budget_.fits(bytes)) || (slopes_.give_back(budget_) && budget_.fits(bytes));
+bool TileStore::has_room(gpu::RenderThread& thread, std::size_t bytes) {
+  return budget_.fits(bytes) || (colours_.give_back(thread, budget_) && budget_.fits(bytes)) || (slopes_.give_back(thread, budget_) && budget_.fits(bytes));
 }
 
 Result<void> TileStore::upload_geometry(gpu::RenderThread& thread, const geo::TileKey& key,
                                         const surface::TileGeometry& geometry) {
   release(key, surface::Part::geometry);
   const Error full{ErrorCode::exhausted, "the GPU budget has no room for the geometry of tile " + geo::to_string(key)};
-  if (!has_room(geometry.mesh.bytes())) return full;
+  if (!has_room(thread, geometry.mesh.bytes())) return full;
   std::optional<Slot> slot;
   if (!geometry.slopes.slopes.empty()) {
     slot = slopes_.acquire(thread, budget_);
-    if (!slot && colours_.give_back(budget_)) slot = slopes_.acquire(thread, budget_);
+    if (!slot && colours_.give_back(thread, budget_)) slot = slopes_.acquire(thread, budget_);
     if (!slot) return full;
-    if (!has_room(geometry.mesh.bytes())) {  // the slopes needed a new array
+    if (!has_room(thread, geometry.mesh.bytes())) {  // the slopes needed a new array
       slopes_.release(*slot);
       return full;
     }
@@ -126,7 +126,7 @@ void TileStore::upload_slopes(Slot slot, const surface::SlopeMap& map) {
 
 std::optional<Slot> TileStore::acquire_colour(gpu::RenderThread& thread) {
   auto slot = colours_.acquire(thread, budget_);
-  if (!slot && slopes_.give_back(budget_)) slot = colours_.acquire(thread, budget_);
+  if (!slot && slopes_.give_back(thread, budget_)) slot = colours_.acquire(thread, budget_);
   return slot;
 }
 

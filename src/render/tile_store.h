@@ -71,7 +71,7 @@ class TileStore {
  private:
   Layer layer_of(Slot colour) const { return {colours_.texture(colour), static_cast<float>(colour.layer)}; }
   /// Slot arrays that nothing uses give way.
-  bool has_room(std::size_t bytes);
+  bool has_room(gpu::RenderThread& thread, std::size_t bytes);
   std::optional<Slot> acquire_colour(gpu::RenderThread& thread);
   void release_colour(std::optional<Slot>& slot);
   void upload_slopes(Slot slot, const surface::SlopeMap& map);

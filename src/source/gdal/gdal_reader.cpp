@@ -14,7 +14,27 @@
 namespace tellurion::source {
 namespace {
 
+constexpr int kPieceSamples = 1 << 15;  ///< read at a time where many are averaged
+
 std::size_t area(const PixelWindow& window) { return static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height); }
+
+/// The window in pieces of few samples, those of a block of the file one after the other: it is decoded once.
+std::vector<PixelWindow> pieces_of(const PixelWindow& window, int block_width, int block_height) {
+  const int right = window.x + window.width;
+  const int bottom = window.y + window.height;
+  // What each step goes to: the next border of a block, or of several that are a piece together.
+  const auto next_border = [](int from, int block, int most, int end) { return std::min((from / block + std::max(most / block, 1)) * block, end); };
+  std::vector<PixelWindow> pieces;
+  for (int y = window.y, below = y; y < bottom; y = below) {
+    below = next_border(y, block_height, kPieceSamples / std::min(block_width, window.width), bottom);
+    for (int x = window.x, beside = x; x < right; x = beside) {
+      beside = next_border(x, block_width, kPieceSamples / (below - y), right);
+      const int rows = std::max(kPieceSamples / (beside - x), 1);
+      for (int row = y; row < below; row += rows) pieces.push_back({x, row, beside - x, std::min(rows, below - row)});
+    }
+  }
+  return pieces;
+}
 
 }  // namespace
 
@@ -118,7 +138,7 @@ Result<raster::HeightGrid> GdalReader::heights_of_overview(int overview, const P
   return grid;
 }
 
-/// A level that the file lacks: the samples of a finer one, averaged strip by strip.
+/// A level that the file lacks: the samples of a finer one, averaged piece by piece.
 template <class Data, class Read>
 Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Read& read) const {
   const LevelSize size = layout_->description.levels[static_cast<std::size_t>(level)];
@@ -131,16 +151,16 @@ Result<Data> GdalReader::averaged(int level, const PixelWindow& window, const Re
   const int right = std::min(static_cast<int>(std::ceil((window.x + window.width) * step_x)), fine.GetXSize());
   const int top = static_cast<int>(std::floor(window.y * step_y));
   const int bottom = std::min(static_cast<int>(std::ceil((window.y + window.height) * step_y)), fine.GetYSize());
-  constexpr int kStripSamples = 1 << 20;
-  const int strip_rows = std::max(1, kStripSamples / (right - left));
+  int block_width = 1;
+  int block_height = 1;
+  fine.GetBlockSize(&block_width, &block_height);
   bool pending = false;
-  for (int row = top; row < bottom; row += strip_rows) {
-    const PixelWindow strip{left, row, right - left, std::min(strip_rows, bottom - row)};
-    Result<Data> samples = read(overview, strip);
+  for (const PixelWindow& piece : pieces_of({left, top, right - left, bottom - top}, block_width, block_height)) {
+    Result<Data> samples = read(overview, piece);
     if (!samples && samples.error().code == ErrorCode::pending) pending = true;  // the others are asked for too
     else if (!samples) return samples.error();
     if (pending) continue;
-    average.add(samples.value(), left, row);
+    average.add(samples.value(), piece.x, piece.y);
   }
   if (pending) return Error{ErrorCode::pending, layout_->options.path};
   if constexpr (std::is_same_v<Data, raster::HeightGrid>) {
