@@ -155,20 +155,17 @@ Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderT
   globe_options.time = options.view.time;
   auto globe = globe::Globe::open(std::move(*world), globe_options);
   if (globe) {
-    // A picture shows all of a catalogue, a window what is known of it.
-    constexpr std::chrono::minutes kPatience{10};
-    if (use == RenderThreadUse::waits) (void)(*globe)->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience);
     for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
   }
   return globe;
 }
 
-GroundWarning::GroundWarning(const globe::Globe& globe) {
-  if (auto sampler = globe.height_sampler()) sampler_.emplace(std::move(*sampler));
-}
-
 void GroundWarning::check(const geo::Geodetic& eye, double exaggeration) {
-  if (!sampler_) return;
+  if (!sampler_) {
+    auto opened = globe_->height_sampler();
+    if (!opened) return;
+    sampler_.emplace(std::move(*opened));
+  }
   constexpr double kShareOfHeight = 0.01;  // finer data would have to be fetched for nothing
   const Metres spacing(kShareOfHeight * std::max(eye.height.value, 0.0));
   const auto ground = sampler_->height_at(geo::place_of(eye), globe::HeightLookup::bilinear, spacing);

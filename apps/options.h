@@ -73,11 +73,12 @@ view::Pose camera_or_home(const Options& options, const globe::Globe& globe);
 /// Says on standard error, once, that the camera is below the ground.
 class GroundWarning {
  public:
-  explicit GroundWarning(const globe::Globe& globe);
+  explicit GroundWarning(const globe::Globe& globe) : globe_(&globe) {}
   void check(const geo::Geodetic& eye, double exaggeration);
 
  private:
-  std::optional<globe::HeightSampler> sampler_;
+  const globe::Globe* globe_;
+  std::optional<globe::HeightSampler> sampler_;  ///< since the first check
 };
 
 /// Writes text to a file. Errors: unavailable.

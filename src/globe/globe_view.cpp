@@ -59,16 +59,17 @@ std::vector<std::uint32_t> missing_layers(const Finished& item) {
 }  // namespace
 
 struct GlobeView::State {
-  State(Globe& g, gpu::RenderThread& t) : globe(g), thread(t), tree(g.ellipsoid(), g.facts()), surface(g.surface()), heights(g.surface()) {}
+  State(Globe& g, gpu::RenderThread& t)
+      : globe(g), thread(t), surface(g.surface()), facts(g.facts()), first_facts(facts), heights(surface), tree(g.ellipsoid(), facts) {}
 
   Globe& globe;
   gpu::RenderThread& thread;
   std::unique_ptr<render::Renderer> renderer;
-  surface::TileTree tree;
   std::shared_ptr<const surface::SurfaceDescription> surface;  ///< at the time that is shown
   std::shared_ptr<const surface::SurfaceFacts> facts;          ///< of it
   std::shared_ptr<const surface::SurfaceFacts> first_facts;    ///< of the globe: tell when the tables change
   std::shared_ptr<const surface::SurfaceDescription> heights;  ///< the surface whose heights are shown
+  surface::TileTree tree;                                      ///< of `facts`
   SlotAges slots{Part::colour};
   SlotAges meshes{Part::geometry};                             ///< but for the roots: see roots_to_renew
   SlotAges::Stale stale;                                       ///< of the last frame
@@ -173,6 +174,7 @@ void GlobeView::State::show_heights() {
   meshes.layers_changed(*heights, *latest);
   tree.forget_failures(Part::geometry);
   heights = std::move(latest);
+  roots_to_renew = geo::kFaceCount;
 }
 
 /// Has what is shown and no longer true made anew; it is shown until then.
@@ -260,6 +262,10 @@ void GlobeView::State::take_over(Finished item) {
   const bool renews = age.holds(item.key);
   const bool current = item.revision == (item.part == Part::colour ? surface : heights)->revision;
   if (renews && !current) return age.not_asked(item.key);  // its own content is no older
+  if (item.key.level == 0 && item.part == Part::geometry && !current) {  // nor is a root's, which is asked for anew
+    --roots_renewing;
+    return;
+  }
   if (auto* awaited = std::get_if<source::Awaited>(&item.content)) {
     if (awaited->empty() && (renews || item.key.level > 0)) {  // another part has asked for them
       age.not_asked(item.key);
@@ -472,7 +478,6 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   state->max_bytes = std::max(gpu_budget_bytes / 4 * 3, kLeastBytes);
   state->max_in_flight = 4 * std::max(globe.worker_count(), 1);
   state->finished = std::make_shared<FinishedQueue>(static_cast<std::size_t>(state->max_in_flight) + 2 * geo::kFaceCount);
-  state->facts = state->first_facts = globe.facts();
   if (auto roots = state->load_roots(); !roots) return roots.error();
   globe.begin_tables();
   return std::unique_ptr<GlobeView>(new GlobeView(std::move(state)));
@@ -500,7 +505,8 @@ const FrameStats& GlobeView::draw(const view::Camera& camera, const ViewSettings
 
 bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings, Clock::time_point deadline) {
   State& s = *state_;
-  if (!s.globe.wait_for_tables(deadline)) return false;
+  // Else every raster that a catalogue comes to know would have tiles built anew.
+  if (!s.globe.wait_for_catalogues(deadline) || !s.globe.wait_for_tables(deadline)) return false;
   constexpr double kNoLimit = 1e9;
   s.patience.progressed(Clock::now());
   for (;;) {

@@ -58,20 +58,27 @@ bool SlotAges::may_lack(const geo::TileKey& key, const std::vector<std::uint32_t
 SlotAges::Stale SlotAges::find(std::span<const surface::DrawTile> drawn, TimePoint now) {
   ++frame_;
   Stale stale;
+  if (std::ranges::none_of(slots_, [](const auto& slot) { return slot.second.stale; })) return stale;
   for (const surface::DrawTile& tile : drawn) {
-    const bool colour = part_ == surface::Part::colour;
-    for (const geo::TileKey& owner : {colour ? tile.colour_owner : tile.key, colour ? tile.colour_before : tile.slope_owner}) {
-      const auto found = slots_.find(owner);
-      if (found == slots_.end() || !found->second.stale) continue;
-      Slot& slot = found->second;
-      stale.any = true;
-      stale.may_change = stale.may_change || slot.retry_at != TimePoint::max();
-      if (slot.shown == frame_) continue;
-      slot.shown = frame_;
-      if (!slot.asked && slot.retry_at <= now) stale.to_ask.push_back(owner);
+    if (part_ == surface::Part::colour) {
+      find(tile.colour_owner, now, stale);
+      find(tile.colour_before, now, stale);
+    } else {
+      for (int level = tile.key.level; level > 0; --level) find(geo::ancestor(tile.key, level), now, stale);
     }
   }
   return stale;
+}
+
+void SlotAges::find(const geo::TileKey& key, TimePoint now, Stale& stale) {
+  const auto found = slots_.find(key);
+  if (found == slots_.end() || !found->second.stale) return;
+  Slot& slot = found->second;
+  stale.any = true;
+  stale.may_change = stale.may_change || slot.retry_at != TimePoint::max();
+  if (slot.shown == frame_) return;
+  slot.shown = frame_;
+  if (!slot.asked && slot.retry_at <= now) stale.to_ask.push_back(key);
 }
 
 void SlotAges::failed(const geo::TileKey& key, TimePoint retry_at) {

@@ -41,7 +41,8 @@ class SlotAges {
     bool any = false;                  ///< the drawn tiles show some old slot
     bool may_change = false;           ///< of which some have not failed for good
   };
-  /// Of the slots that `drawn` shows. Call once a frame.
+  /// Of the slots that `drawn` shows; of geometry of those above them too, for the choice of tiles rests on what they tell. Call once
+  /// a frame.
   Stale find(std::span<const surface::DrawTile> drawn, TimePoint now);
 
   void asked(const geo::TileKey& key) { set_asked(key, true); }
@@ -59,6 +60,7 @@ class SlotAges {
     std::vector<std::uint32_t> missing{};  ///< layers that it was composed without
   };
   void set_asked(const geo::TileKey& key, bool on);
+  void find(const geo::TileKey& key, TimePoint now, Stale& stale);
 
   surface::Part part_;
   std::map<geo::TileKey, Slot> slots_;
