@@ -129,6 +129,7 @@ Result<void> measure_holes(const Setting& setting, Report& report) {
     loading.add(background_pixels(*scene, camera, settings), *view);
     if (auto done = finish(*scene, camera, settings); !done) return done;
     finished.add(background_pixels(*scene, camera, settings), *view);
+    if ((i + 1) % 100 == 0) fmt::print(stderr, "tellurion: {} of {} views, {} and {} pixels\n", i + 1, count, loading.pixels, finished.pixels);
   }
   report.set("loading", static_cast<double>(loading.pixels), loading.note(count));
   report.set("finished", static_cast<double>(finished.pixels), finished.note(count));
