@@ -16,5 +16,6 @@ std::vector<Benchmark> truth_benchmarks();   ///< truth.*: the picture against t
 std::vector<Benchmark> pole_benchmarks();    ///< poles.*: a pole against the equator
 std::vector<Benchmark> hole_benchmarks();    ///< holes.*: pixels that show the background
 std::vector<Benchmark> memory_benchmarks();  ///< memory.*: what a long flight takes
+std::vector<Benchmark> catalogue_benchmarks();  ///< catalogue.*: thousands of rasters as one layer
 
 }  // namespace tellurion::bench
