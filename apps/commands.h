@@ -16,6 +16,7 @@ void add_fly(CLI::App& app, Run& run);
 void add_height(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
 void add_ingest(CLI::App& app, Run& run);
+void add_world_files(CLI::App& app, Run& run);
 void add_cache(CLI::App& app, Run& run);
 /// Under `cache`.
 void add_prefetch(CLI::App& cache, Run& run);

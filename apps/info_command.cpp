@@ -58,6 +58,14 @@ void print_raster(const source::RasterDescription& raster) {
     fmt::print("  heights     above {}{}\n", raster.vertical, raster.vertical_declared ? "" : " (not declared: taken as such)");
 }
 
+void print_catalogue(const globe::LayerSpec& layer, const globe::CatalogueFacts& facts) {
+  const auto& source = layer.source;
+  if (!source.path.empty()) fmt::print("  list        {}\n", source.path.string());
+  if (!source.catalogue.files.empty()) fmt::print("  files       {}\n", source.catalogue.files.size());
+  fmt::print("  rasters     {}, {} lie over the others\n", facts.rasters, source.catalogue.order == "finest" ? "finer ones" : "later ones");
+  if (facts.rasters > 0) fmt::print("  spacing     {:.3f} .. {:.3f} m\n", facts.finest.value, facts.coarsest.value);
+}
+
 struct InfoOptions : Options {
   std::filesystem::path picture;
   bool exact = false;
@@ -105,11 +113,15 @@ int info(const InfoOptions& options) {
   if (!globe) return report(globe.error());
   const globe::World& w = (*globe)->world();
   fmt::print("planet {}: {:.3f} x {:.3f} m\n", w.planet, w.ellipsoid.a(), w.ellipsoid.b());
-  for (const globe::LayerInfo& layer : (*globe)->layers()) {
+  (void)(*globe)->wait_for_catalogues(std::chrono::steady_clock::time_point::max());
+  for (std::size_t i = 0; i < (*globe)->layers().size(); ++i) {
+    const globe::LayerInfo& layer = (*globe)->layers()[i];
     fmt::print("layer {} ({}){}\n", layer.spec.name, name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
     if (layer.raster) {
       print_raster(layer.raster->description());
       print_statistics(layer, options.exact);
+    } else if (const auto catalogue = globe::catalogue_facts(**globe, i)) {
+      print_catalogue(layer.spec, *catalogue);
     } else {
       fmt::print("  file        {}\n", layer.spec.source.url.empty() ? layer.spec.source.path.string() : fetch::without_credentials(layer.spec.source.url));
     }

@@ -25,13 +25,14 @@ int run_program(int argc, char** argv) {
   add_height(app, run);
   add_info(app, run);
   add_ingest(app, run);
+  add_world_files(app, run);
   add_cache(app, run);
   add_bench(app, run);
   const std::string first = argc > 1 ? argv[1] : "";
   const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
   const bool is_command = std::any_of(commands.begin(), commands.end(), [&](const CLI::App* command) { return command->get_name() == first; });
   if (!first.empty() && first.front() != '-' && !is_command) {
-    fmt::print(stderr, "tellurion: \"{}\" is no command; there are view, render, fly, height, info, ingest, cache and bench; see tellurion --help\n", first);
+    fmt::print(stderr, "tellurion: \"{}\" is no command; there are view, render, fly, height, info, ingest, world, cache and bench; see tellurion --help\n", first);
     return kWrongUsage;
   }
   try {

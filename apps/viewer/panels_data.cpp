@@ -38,7 +38,12 @@ void raster_rows(const source::RasterDescription& raster) {
     table_row("vertical datum", raster.vertical_declared ? raster.vertical : raster.vertical + " (assumed)");
 }
 
-void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats& stats, const std::string& step) {
+void catalogue_rows(const globe::CatalogueFacts& facts) {
+  table_row("rasters", facts.to_look_into == 0 ? fmt::format("{}", facts.rasters) : fmt::format("{}, {} more to be looked into", facts.rasters, facts.to_look_into));
+  if (facts.rasters > 0) table_row("spacing", fmt::format("{:.4g} to {:.4g} m", facts.finest.value, facts.coarsest.value));
+}
+
+void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats& stats, const std::string& step, const std::optional<globe::CatalogueFacts>& catalogue) {
   const bool failed = !layer.error.empty() || stats.errors > 0;
   if (failed) ImGui::PushStyleColor(ImGuiCol_Text, kErrorColour);
   const std::string title =
@@ -52,6 +57,7 @@ void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats& stats,
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingStretchProp)) {
     if (!step.empty()) table_row("time", step);
     if (layer.raster) raster_rows(layer.raster->description());
+    if (catalogue) catalogue_rows(*catalogue);
     table_row("read", fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(stats.bytes)), stats.requests));
     if (stats.errors > 0) table_row("errors", std::to_string(stats.errors));
     ImGui::EndTable();
@@ -151,7 +157,7 @@ void Panels::layers(const globe::Globe& globe, const std::optional<UtcTime>& tim
     if (!globe.world().file.empty()) ImGui::TextDisabled("%s", globe.world().file.string().c_str());
     for (std::size_t i = 0; i < globe.layers().size(); ++i) {
       ImGui::PushID(static_cast<int>(i));
-      layer_entry(globe.layers()[i], stats[i], globe.step_of(i, time));
+      layer_entry(globe.layers()[i], stats[i], globe.step_of(i, time), globe::catalogue_facts(globe, i));
       ImGui::PopID();
     }
   }

@@ -12,6 +12,7 @@
 #include "globe/picture_file.h"
 #include "globe/prefetch.h"
 #include "globe/world.h"
+#include "globe/world_edit.h"
 #include "source/raster_source.h"
 #include "view/camera.h"
 #include "view/controllers.h"

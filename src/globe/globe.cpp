@@ -422,8 +422,12 @@ std::shared_ptr<const source::Catalogue> Globe::catalogue_of(std::size_t layer) 
   return state_->catalogues[layer] ? state_->catalogues[layer]->current() : nullptr;
 }
 
+std::size_t Globe::rasters_to_look_into(std::size_t layer) const {
+  return state_->catalogues[layer] ? state_->catalogues[layer]->unexamined() : 0;
+}
+
 bool Globe::catalogues_ready() const {
-  return std::ranges::all_of(state_->catalogues, [](const auto& catalogue) { return !catalogue || catalogue->is_complete(); });
+  return std::ranges::all_of(state_->catalogues, [](const auto& catalogue) { return !catalogue || catalogue->unexamined() == 0; });
 }
 
 bool Globe::tables_ready() const { return state_->tables->ready(); }

@@ -117,6 +117,8 @@ class Globe {
   Result<void> remove(std::size_t layer, const std::vector<std::string>& rasters);
   /// A catalogue's rasters as they are known now; null for other layers.
   std::shared_ptr<const source::Catalogue> catalogue_of(std::size_t layer) const;
+  /// How many rasters of it have not been looked into.
+  std::size_t rasters_to_look_into(std::size_t layer) const;
   /// Whether all rasters of catalogues have been looked into.
   bool catalogues_ready() const;
   /// Waits for that (without threads: looks into them here). False if `deadline` came first.

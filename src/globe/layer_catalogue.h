@@ -39,8 +39,8 @@ class LayerCatalogue {
   void begin();
   /// Worker side: looks into some rasters whose footprint is not known, publishes what it found, and asks for another call if there are more.
   void examine_some();
-  /// Whether every raster has been looked into.
-  bool is_complete() const { return unexamined_ == 0; }
+  /// How many rasters have not been looked into.
+  std::size_t unexamined() const { return unexamined_; }
 
   /// Puts rasters in, over the others of their fineness; in the place of those of the same path. They show once they have been looked into.
   void insert(const std::vector<std::string>& paths);

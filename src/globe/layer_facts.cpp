@@ -1,12 +1,28 @@
 #include "globe/layer_facts.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "source/catalogue/catalogue.h"
 #include "source/debug/footprint.h"
 
 namespace tellurion::globe {
 
 Result<source::RasterStatistics> statistics_of(const LayerInfo& layer, double most_samples) { return source::statistics_of(*layer.raster, most_samples); }
+
+std::optional<CatalogueFacts> catalogue_facts(const Globe& globe, std::size_t layer) {
+  const auto catalogue = globe.catalogue_of(layer);
+  if (!catalogue) return std::nullopt;
+  CatalogueFacts facts;
+  facts.rasters = catalogue->sets().size();
+  facts.to_look_into = globe.rasters_to_look_into(layer);
+  if (facts.rasters > 0) {
+    const auto [finest, coarsest] = std::ranges::minmax(catalogue->sets(), {}, [](const auto& set) { return set->footprint.spacing(); });
+    facts.finest = finest->footprint.spacing();
+    facts.coarsest = coarsest->footprint.spacing();
+  }
+  return facts;
+}
 
 Result<ShownFootprints> with_footprints(World world, const std::vector<LayerInfo>& layers) {
   ShownFootprints shown{std::move(world), {}};

@@ -82,9 +82,8 @@ class WorldReader {
     const auto group = text(table, "group");
     if (!group) {
       fail(table, "the layer has no `group`");
-    } else if (const auto* found = std::find(std::begin(kGroupNames), std::end(kGroupNames), *group);
-               found != std::end(kGroupNames)) {
-      layer.group = static_cast<LayerGroup>(found - std::begin(kGroupNames));
+    } else if (const auto found = group_by_name(*group)) {
+      layer.group = *found;
     } else {
       fail(*table.get("group"), fmt::format("no group is called \"{}\": it is one of {}", *group, fmt::join(kGroupNames, ", ")));
     }
@@ -402,6 +401,14 @@ class WorldReader {
 }  // namespace
 
 std::string_view name_of(LayerGroup group) { return kGroupNames[static_cast<std::size_t>(group)]; }
+
+std::optional<LayerGroup> group_by_name(std::string_view name) {
+  const auto* found = std::ranges::find(kGroupNames, name);
+  if (found == std::end(kGroupNames)) return std::nullopt;
+  return static_cast<LayerGroup>(found - std::begin(kGroupNames));
+}
+
+std::string data_name(const SourceSpec& source) { return source.url.empty() ? source.path.string() : fetch::public_part(source.url); }
 
 Result<World> parse_world(std::string_view text, const std::filesystem::path& folder, const std::string& name) {
   try {

@@ -26,6 +26,7 @@ enum class LayerGroup { height, color, grayscale, grayscale_overlay, water, nigh
 
 /// The group's name in world files.
 std::string_view name_of(LayerGroup group);
+std::optional<LayerGroup> group_by_name(std::string_view name);
 
 inline constexpr int kEveryLevel = 30;   ///< as SourceSpec::max_level of "cesium-terrain": all that the server says it has
 inline constexpr int kTerrainSize = 128; ///< the usual SourceSpec::tile_size of "cesium-terrain"
@@ -83,6 +84,9 @@ struct SourceSpec {
   bool is_service() const { return type == "wmts" || type == "wms" || type == "tms"; }
 };
 
+/// The path, or the URL without what is secret in it; empty if there is neither.
+std::string data_name(const SourceSpec& source);
+
 struct LayerSpec {
   std::string name;
   LayerGroup group = LayerGroup::color;
@@ -124,5 +128,10 @@ Result<std::filesystem::path> default_data_folder();
 /// tiles, a URL tiles, or a file of them, or a GeoTIFF on a server, by its ending; anything else a raster: shown on the
 /// body that its CRS names, over the default world's layers if that is the Earth.
 Result<World> resolve_world(const std::string& argument);
+
+/// The world of one layer that shows `data`, on its own body: a raster, an archive, tiles or a GeoTIFF on a server, or all rasters of a
+/// list (see source::list_rasters), as which a folder counts in any case. Errors: those of resolve_world and list_rasters;
+/// invalid_argument (a world file, a list of nothing).
+Result<World> world_of_data(const std::string& data, bool is_list = false);
 
 }  // namespace tellurion::globe

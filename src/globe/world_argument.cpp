@@ -9,6 +9,7 @@
 
 #include "geo/body.h"
 #include "fetch/transfer.h"
+#include "source/catalogue/listing.h"
 #include "source/gdal/raster_body.h"
 #include "source/tiles/tile_template.h"
 
@@ -128,6 +129,30 @@ Result<World> resolve_world(const std::string& argument) {
   const std::string type = type_by_name(argument);
   if (!type.empty() && type != "cog") return world_of_archive(type, {}, file);
   return world_of_raster(file);
+}
+
+Result<World> world_of_data(const std::string& data, bool is_list) {
+  std::error_code failure;
+  const std::filesystem::path path = std::filesystem::absolute(data, failure).lexically_normal();
+  if (path.extension() == ".toml" || data.empty()) return Error{ErrorCode::invalid_argument, fmt::format("{}: a world file is no data of a layer", data)};
+  if (!is_list && !std::filesystem::is_directory(path, failure)) {
+    auto world = resolve_world(data);
+    if (!world) return world;
+    world->layers.erase(world->layers.begin(), world->layers.end() - 1);
+    return world;
+  }
+  const auto list = source::list_rasters(path, geo::kWgs84);  // where they lie does not matter here
+  if (!list) return list.error();
+  if (list->rasters.empty()) return Error{ErrorCode::invalid_argument, fmt::format("{}: there are no rasters in it", data)};
+  auto world = world_of_raster(list->rasters.front().path);
+  if (!world) return world;
+  LayerSpec layer = world->layers.back();
+  layer.name = path.stem().string();
+  layer.source = {};
+  layer.source.type = "catalogue";
+  layer.source.path = path;
+  world->layers = {layer};
+  return world;
 }
 
 }  // namespace tellurion::globe

@@ -1,4 +1,5 @@
-#include <filesystem>
+#include "globe/world_text.h"
+
 #include <fstream>
 #include <sstream>
 
@@ -6,7 +7,6 @@
 #include <toml++/toml.h>
 
 #include "geo/body.h"
-#include "globe/world.h"
 
 namespace tellurion::globe {
 namespace {
@@ -77,7 +77,7 @@ std::string path_in(const std::filesystem::path& path, const std::filesystem::pa
 /// What source_table has to say of a catalogue only.
 void add_catalogue(const SourceSpec& source, const std::filesystem::path& folder, toml::table& table) {
   std::vector<std::string> files;
-  for (const std::string& file : source.catalogue.files) files.push_back(file.starts_with("http") ? file : path_in(file, folder));
+  for (const std::string& file : source.catalogue.files) files.push_back(name_in(file, folder));
   if (!files.empty()) table.insert("files", array_of(files));
   if (source.catalogue.order != CatalogueSpec{}.order) table.insert("order", source.catalogue.order);
 }
@@ -132,47 +132,75 @@ toml::table source_table(const SourceSpec& source, const std::filesystem::path& 
   return table;
 }
 
-}  // namespace
+toml::table layer_table(const LayerSpec& layer, const std::filesystem::path& folder) {
+  toml::table table;
+  table.insert("name", layer.name);
+  table.insert("group", std::string(name_of(layer.group)));
+  table.insert("source", source_table(layer.source, folder));
+  if (layer.opacity != 1.0) table.insert("opacity", layer.opacity);
+  if (layer.gamma != 1.0) table.insert("gamma", layer.gamma);
+  if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
+  if (!layer.enabled) table.insert("enabled", false);
+  if (layer.adds) table.insert("mode", "add");
+  if (!layer.attribution.empty()) table.insert("attribution", layer.attribution);
+  return table;
+}
 
-std::string to_toml(const World& world) {
+toml::table planet_table(const World& world) {
   toml::table planet;
   planet.insert("name", world.planet);
   const auto body = geo::find_body(world.planet);
   if (!body || !(body->ellipsoid == world.ellipsoid))
     planet.insert("radii", toml::array{world.ellipsoid.a(), world.ellipsoid.b()});
-  toml::array layers;
-  for (const LayerSpec& layer : world.layers) {
-    toml::table table;
-    table.insert("name", layer.name);
-    table.insert("group", std::string(name_of(layer.group)));
-    table.insert("source", source_table(layer.source, world.file.parent_path()));
-    if (layer.opacity != 1.0) table.insert("opacity", layer.opacity);
-    if (layer.gamma != 1.0) table.insert("gamma", layer.gamma);
-    if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
-    if (!layer.enabled) table.insert("enabled", false);
-    if (layer.adds) table.insert("mode", "add");
-    if (!layer.attribution.empty()) table.insert("attribution", layer.attribution);
-    layers.push_back(std::move(table));
-  }
+  return planet;
+}
+
+std::string text_of(const toml::node& node) {
   std::ostringstream out;
-  out << toml::table{{"planet", std::move(planet)}, {"layer", std::move(layers)}} << "\n";
+  out << toml::toml_formatter(node, toml::toml_formatter::default_flags & ~toml::format_flags::allow_literal_strings);
   return out.str();
+}
+
+}  // namespace
+
+std::string name_in(const std::string& path, const std::filesystem::path& folder) {
+  return path.starts_with("http://") || path.starts_with("https://") ? path : path_in(path, folder);
+}
+
+std::string to_toml(const LayerSpec& layer, const std::filesystem::path& folder) {
+  return text_of(toml::table{{"layer", toml::array{layer_table(layer, folder)}}}) + "\n";
+}
+
+std::string planet_to_toml(const World& world) { return text_of(toml::table{{"planet", planet_table(world)}}) + "\n"; }
+
+std::string to_toml(const std::string& text) { return text_of(toml::value<std::string>(text)); }
+
+std::string to_toml(const World& world) {
+  toml::array layers;
+  for (const LayerSpec& layer : world.layers) layers.push_back(layer_table(layer, world.file.parent_path()));
+  return text_of(toml::table{{"planet", planet_table(world)}, {"layer", std::move(layers)}}) + "\n";
+}
+
+Result<void> write_whole(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path part = file.string() + ".part";
+  {
+    std::ofstream stream(part, std::ios::binary);
+    stream << text;
+    if (!stream.flush())
+      return Error{ErrorCode::unavailable, fmt::format("{}: cannot be written; is the folder there and writable?", file.string())};
+  }
+  std::error_code failure;
+  if (const auto old = std::filesystem::status(file, failure); std::filesystem::exists(old)) std::filesystem::permissions(part, old.permissions(), failure);
+  std::filesystem::rename(part, file, failure);
+  if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", file.string(), failure.message())};
+  return {};
 }
 
 Result<void> save_world(const World& world, const std::filesystem::path& file) {
   World placed = world;
   std::error_code failure;
   placed.file = std::filesystem::absolute(file, failure);
-  const std::filesystem::path part = file.string() + ".part";
-  {
-    std::ofstream stream(part, std::ios::binary);
-    stream << to_toml(placed);
-    if (!stream.flush())
-      return Error{ErrorCode::unavailable, fmt::format("{}: cannot be written; is the folder there and writable?", file.string())};
-  }
-  std::filesystem::rename(part, file, failure);
-  if (failure) return Error{ErrorCode::unavailable, fmt::format("{}: {}", file.string(), failure.message())};
-  return {};
+  return write_whole(file, to_toml(placed));
 }
 
 }  // namespace tellurion::globe

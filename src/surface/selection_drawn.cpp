@@ -18,8 +18,16 @@ double height_error(const Node& node) {
   return std::max(node.shown_bound_m, parent.error_known ? parent.bound_m : 4 * node.shown_bound_m);
 }
 
-/// The same, and what it may be drawn lower by.
-double shown_error(const Node& node) { return height_error(node) + node.sink_m; }
+/// How far the skirt of a neighbour may have to reach: the same, and what it may be drawn lower by. Where the error is only foretold, finer
+/// tiles may find more: nothing but the range of its heights is sure.
+double shown_error(const SelectionFrame& frame, const Node& node) {
+  double error = height_error(node);
+  if (node.facts.assumed && node.built) {
+    const TileMetrics& metrics = node.built->metrics;
+    error = std::max(error, frame.settings.exaggeration * static_cast<double>(metrics.max_height - metrics.min_height));
+  }
+  return error + node.sink_m;
+}
 
 bool shows_colour(const Node& node) { return node.is_root() || node.resident(Part::colour) != nullptr; }
 
@@ -150,7 +158,7 @@ void DrawnCut::advance(const SelectionFrame& frame, Node& node) {
 
 /// Tells the ancestors what is drawn below them, for border_error.
 void DrawnCut::mark_border(const SelectionFrame& frame, Node& node) {
-  const double error = shown_error(node);
+  const double error = shown_error(frame, node);
   for (Node* n = &node; n != nullptr; n = n->parent) {
     if (n->bordered == frame.number && n->border_error_m >= error) return;
     n->border_error_m = n->bordered == frame.number ? std::max(n->border_error_m, error) : error;
@@ -176,7 +184,7 @@ DrawTile DrawnCut::tile_of(const SelectionFrame& frame, Node& node) {
     beyond = std::max(beyond, border_error(frame, node, side));
   }
   const double distance = std::max(node.distance, kNearestDistance);
-  const double skirt = shown_error(node) + beyond + kSkirtPixels * frame.errors.pixel_angle * distance;
+  const double skirt = shown_error(frame, node) + beyond + kSkirtPixels * frame.errors.pixel_angle * distance;
 
   // A slot of an ancestor shows larger texels than the tile's own; that counts unless there is nothing finer to show.
   double error_px = std::max(node.error_px, node.shown_px);
