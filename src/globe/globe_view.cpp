@@ -1,6 +1,7 @@
 #include "globe/globe_view.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <thread>
 #include <variant>
@@ -24,7 +25,7 @@ using Clock = std::chrono::steady_clock;
 using surface::Part;
 
 constexpr double kFrameBudgetMs = 1000.0 / 30.0;
-constexpr std::chrono::seconds kRootDeadline{60};
+constexpr std::chrono::seconds kRootDeadline{5};  ///< then a view begins without the roots that are still built
 constexpr std::chrono::seconds kPause{1};  ///< before a part that failed is asked for again
 constexpr std::chrono::seconds kPauseWithout{5};  ///< the same if it is shown without what failed
 constexpr std::size_t kLeastBytes = 16u << 20;
@@ -433,15 +434,16 @@ Result<void> GlobeView::State::load_roots() {
     }
   }
   std::vector<WaitingPart> late;
+  std::array<bool, geo::kFaceCount> has_ground{};
   while (missing > 0) {
     globe.run_one();
     auto item = finished->pop_until(std::min(deadline, Clock::now() + std::chrono::milliseconds(20)));
     if (!item) {
-      if (Clock::now() >= deadline)
-        return Error{ErrorCode::unavailable, "the planet's coarsest tiles did not load within a minute: are its files on a slow disk?"};
+      if (Clock::now() >= deadline) break;
       continue;
     }
     --missing;
+    if (item->part == Part::geometry) has_ground[item->key.face] = true;
     if (item->part == Part::geometry && (std::holds_alternative<Error>(item->content) || std::holds_alternative<source::Awaited>(item->content))) {
       // Heights that cannot be read, or not yet, must not leave a hole: a bare ellipsoid stands in.
       auto bare = build_bare(item->key);
@@ -452,7 +454,18 @@ Result<void> GlobeView::State::load_roots() {
     }
     take_over(std::move(*item));
   }
-  roots_renewing = static_cast<int>(late.size());
+  // Those that workers still build come later, too.
+  int still_built = 0;
+  for (std::uint8_t face = 0; face < geo::kFaceCount; ++face) {
+    if (has_ground[face]) continue;
+    const geo::TileKey root{face, 0, 0, 0};
+    auto bare = build_bare(root);
+    if (!bare) return bare.error();
+    ++in_flight;  // as the one that is taken over, which nobody was asked for
+    take_over(Finished{root, Part::geometry, heights->revision, std::move(*bare)});
+    ++still_built;
+  }
+  roots_renewing = static_cast<int>(late.size()) + still_built;
   for (WaitingPart& part : late) waiting.push_back(std::move(part));
   return {};
 }
