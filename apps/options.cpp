@@ -175,8 +175,10 @@ void GroundWarning::check(const geo::Geodetic& eye, double exaggeration) {
   sampler_.reset();  // once is enough
 }
 
-view::Pose camera_or_home(const Options& options, const globe::Globe& globe) {
-  return options.camera ? *options.camera : globe.home();  // home may wait for the network
+view::Pose camera_or_home(const Options& options, globe::Globe& globe, std::chrono::milliseconds patience) {
+  if (options.camera) return *options.camera;
+  (void)globe.wait_for_catalogues(std::chrono::steady_clock::now() + patience);
+  return globe.home();  // may wait for the network
 }
 
 Result<void> write_text(const std::filesystem::path& file, const std::string& text) {

@@ -67,8 +67,8 @@ enum class RenderThreadUse { draws, waits };
 /// Opens the world that the options name and prints its hints.
 Result<std::unique_ptr<globe::Globe>> open_globe(const Options& options, RenderThreadUse use = RenderThreadUse::draws);
 
-/// The camera asked for, else the world's home: its finest data, or the whole body.
-view::Pose camera_or_home(const Options& options, const globe::Globe& globe);
+/// The camera asked for, else the world's home: its finest data, or the whole body. Waits for what catalogues have, as long as `patience`.
+view::Pose camera_or_home(const Options& options, globe::Globe& globe, std::chrono::milliseconds patience);
 
 /// Says on standard error, once, that the camera is below the ground.
 class GroundWarning {

@@ -40,7 +40,7 @@ int render(const Options& options) {
   auto view = globe::GlobeView::create(**globe, **thread, options.gpu_cache_bytes);
   if (!view) return report(view.error());
 
-  const view::Pose pose = camera_or_home(options, **globe);
+  const view::Pose pose = camera_or_home(options, **globe, std::chrono::milliseconds(static_cast<std::int64_t>(options.after_ms ? 0 : options.timeout_seconds * 1e3)));
   const auto camera = view::make_camera((*globe)->ellipsoid(), pose,
                                         to_radians(Degrees(options.vertical_fov_degrees)), options.width, options.height);
   std::string trace = globe::trace_header();

@@ -59,7 +59,7 @@ Result<void> Viewer::open_world() {
   if (!view) return view.error();
   view_ = std::move(*view);
   const auto camera =
-      view::make_camera(globe_->ellipsoid(), camera_or_home(options_, *globe_),
+      view::make_camera(globe_->ellipsoid(), camera_or_home(options_, *globe_, std::chrono::seconds(1)),
                         to_radians(Degrees(options_.vertical_fov_degrees)), options_.width, options_.height);
   navigation_.emplace(globe_->ellipsoid(), camera, [this](const view::Camera& from, glm::dvec2 pixel) {
     return view_->pick(from, pixel, state_.view);

@@ -170,3 +170,17 @@ TEST_CASE("what is put into a layer that is no catalogue, and a file that is non
   CHECK(show.globe->problems().front().find("/vsimem/gone.tif") != std::string::npos);
   CHECK(show.globe->data_missing());
 }
+
+TEST_CASE("a view of a catalogue alone begins over what it has, one of nothing over the whole body") {
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  const Piece west("home_west", 10.0, 0.0), east("home_east", 20.0, 1.0);
+  Show show(**thread, {&west, &east}, 0);
+  REQUIRE(show.globe->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience));
+  const view::Pose home = show.globe->home();
+  CHECK(to_degrees(home.position.latitude).value == doctest::Approx(45.0).epsilon(0.01));  // 40 to 50 north,
+  CHECK(to_degrees(home.position.longitude).value == doctest::Approx(20.0).epsilon(0.001));  // 10 to 30 east
+  CHECK(home.position.height.value > 1e6);
+  CHECK(home.position.height.value < 4e6);
+  CHECK(Show(**thread, {}, 0).globe->home().position.height.value > 1e7);
+}
