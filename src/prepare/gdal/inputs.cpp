@@ -85,15 +85,6 @@ Error unsupported(const Input& input, const std::string& what) { return {ErrorCo
 
 // --- Each input ------------------------------------------------------------------------------------------------------
 
-std::string crs_text(const OGRSpatialReference& crs) {
-  constexpr std::array<const char*, 2> kFormat{"FORMAT=WKT2_2019", nullptr};
-  char* text = nullptr;
-  crs.exportToWkt(&text, kFormat.data());
-  const std::string wkt(text != nullptr ? text : "");
-  CPLFree(text);
-  return wkt;
-}
-
 Result<OGRSpatialReference> crs_from(const std::string& text, const char* option) {
   OGRSpatialReference crs;
   if (crs.SetFromUserInput(text.c_str(), OGRSpatialReference::SET_FROM_USER_INPUT_LIMITATIONS_get()) != OGRERR_NONE || crs.IsEmpty()) {
@@ -339,7 +330,7 @@ Result<Extent> extent_in(const Input& input, const std::string& crs) {
   const Result<GDALDatasetUniquePtr> dataset = source::open_dataset(input.source);
   if (!dataset) return dataset.error();
   const source::QuietErrors quiet;
-  const std::string own = crs_text(input.crs);
+  const std::string own = source::wkt_of(input.crs);
   CPLStringList names;
   names.SetNameValue("SRC_SRS", own.c_str());
   names.SetNameValue("DST_SRS", crs.c_str());
@@ -529,7 +520,7 @@ Result<void> warp(Input& input, const IngestOptions& options, const OutputPlan& 
     (arguments.AddString(fmt::format("{}", values).c_str()), ...);
   };
   add("-of", "VRT");
-  add("-s_srs", crs_text(input.crs));
+  add("-s_srs", source::wkt_of(input.crs));
   add("-t_srs", plan.crs);
   add("-te", west, north + place.height * t[5], west + place.width * t[1], north);
   add("-ts", place.width, place.height);
@@ -620,7 +611,7 @@ void hash_chunks(const std::vector<Input>& inputs, const IngestOptions& options,
       const double reach = 4.0 * std::max({1.0, input.place.width / input.columns, input.place.height / input.rows});
       const Rectangle& place = input.place;
       const bool touches = place.x - reach < chunk.x + chunk.width && chunk.x < place.x + place.width + reach && place.y - reach < chunk.y + chunk.height && chunk.y < place.y + place.height + reach;
-      if (touches) text += fmt::format("|{} {} {} {} {} {}", input.revision, place.x, place.y, place.width, place.height, input.warped ? crs_text(input.crs) : "");
+      if (touches) text += fmt::format("|{} {} {} {} {} {}", input.revision, place.x, place.y, place.width, place.height, input.warped ? source::wkt_of(input.crs) : "");
     }
     if (!text.empty()) plan.chunk_hashes[i] = fmt::format("{:016x}{:016x}", fnv1a(common + text), fnv1a(fmt::format("{}{}{}", chunk.x, text, chunk.y)));
   }
@@ -652,7 +643,7 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   for (Input& input : inputs) input.warped = !input.north_up || !same_crs(input.crs, *crs) || (input.kind == IngestKind::picture && input.no_data);
   Mosaic mosaic;
   OutputPlan& plan = mosaic.plan_;
-  plan.crs = crs_text(*crs);
+  plan.crs = source::wkt_of(*crs);
   plan.block = options.block;
   plan.point_samples = std::all_of(inputs.begin(), inputs.end(), [](const Input& input) { return input.point_samples; });
   if (Result<void> chosen = choose_grid(options, inputs, plan, plan.crs); !chosen) return chosen.error();
@@ -665,7 +656,7 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   const OutputPlan before = plan;
   OGRSpatialReference declared = *crs;
   if (Result<void> put = declare_vertical(options, declared); !put) return put.error();
-  plan.crs = crs_text(declared);
+  plan.crs = source::wkt_of(declared);
   hash_chunks(inputs, options, plan);
   for (Input& input : inputs) {
     if (!input.warped) continue;

@@ -39,11 +39,7 @@ Result<std::string> crs_wkt(GDALDataset& dataset, const GdalOptions& options) {
     return unsupported(options, "says no coordinate system; give it one: crs = \"EPSG:...\" in the world file, or gdal_translate -a_srs EPSG:...");
   }
   if (crs->IsLocal()) return unsupported(options, "has a local coordinate system only; give the right one: crs = \"EPSG:...\" in the world file");
-  constexpr std::array<const char*, 2> kFormat{"FORMAT=WKT2_2019", nullptr};
-  char* text = nullptr;
-  crs->exportToWkt(&text, kFormat.data());
-  const std::string wkt(text != nullptr ? text : "");
-  CPLFree(text);
+  const std::string wkt = wkt_of(*crs);
   if (wkt.empty()) return unsupported(options, "has a coordinate system that cannot be written as WKT; give it one: crs = \"EPSG:...\"");
   return wkt;
 }

@@ -107,6 +107,15 @@ void configure_gdal(std::size_t block_cache_bytes) {
 
 std::size_t gdal_cache_bytes() { return static_cast<std::size_t>(GDALGetCacheUsed64()); }
 
+std::string wkt_of(const OGRSpatialReference& crs) {
+  constexpr std::array<const char*, 2> kFormat{"FORMAT=WKT2_2019", nullptr};
+  char* text = nullptr;
+  crs.exportToWkt(&text, kFormat.data());
+  const std::string wkt(text != nullptr ? text : "");
+  CPLFree(text);
+  return wkt;
+}
+
 Result<GDALDatasetUniquePtr> open_dataset(const std::string& path) {
   prepare_gdal();
   if (begins_with_any(path, kNetworkSchemes)) return Error{ErrorCode::unsupported, fmt::format("{}: {}", path, kNoNetwork)};

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
 #include "base/result.h"
 
@@ -26,6 +27,9 @@ class QuietErrors {
 
 /// Registers drivers and switches the network off; once per process, safe to call again.
 void prepare_gdal();
+
+/// The CRS as WKT 2 of 2019; empty if it cannot be written so.
+std::string wkt_of(const OGRSpatialReference& crs);
 
 /// Opens a raster data set read-only, for one thread.
 /// Errors: not_found, unsupported, corrupt; all name `path`.

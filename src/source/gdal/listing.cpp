@@ -117,19 +117,14 @@ Result<RasterList> list_folder(const fs::path& folder, const std::string& name) 
 // --- VRTs ------------------------------------------------------------------------------------------------------------
 
 /// A VRT's CRS as the rasters' own are read; empty if it says none that counts.
-Result<std::string> wkt_of(const std::string& said) {
+Result<std::string> wkt_as_said(const std::string& said) {
   if (said.empty()) return std::string();
   const QuietErrors quiet;
   OGRSpatialReference crs;
   if (crs.SetFromUserInput(said.c_str(), OGRSpatialReference::SET_FROM_USER_INPUT_LIMITATIONS_get()) != OGRERR_NONE)
     return Error{ErrorCode::corrupt, fmt::format("PROJ does not know its SRS {}", in_quotes(said))};
   if (crs.IsEmpty() || crs.IsLocal()) return std::string();
-  constexpr std::array<const char*, 2> kFormat{"FORMAT=WKT2_2019", nullptr};
-  char* text = nullptr;
-  crs.exportToWkt(&text, kFormat.data());
-  const std::string wkt(text != nullptr ? text : "");
-  CPLFree(text);
-  return wkt;
+  return wkt_of(crs);
 }
 
 /// Puts the part's ring and spacing into `raster`, if it has a place throughout.
@@ -155,7 +150,7 @@ Result<RasterList> list_vrt(std::string_view text, const fs::path& folder, const
   Result<VrtMosaic> mosaic = parse_vrt(text, folder, name);
   if (!mosaic) return mosaic.error();
   const auto named = [&](const Error& error) { return Error{error.code, fmt::format("{}: {}", name, error.message)}; };
-  const Result<std::string> wkt = wkt_of(mosaic->crs);
+  const Result<std::string> wkt = wkt_as_said(mosaic->crs);
   if (!wkt) return named(wkt.error());
   std::optional<PixelMapping> mapping;
   if (mosaic->transform && !wkt->empty()) {

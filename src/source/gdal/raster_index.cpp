@@ -1,6 +1,5 @@
 #include "source/gdal/raster_index.h"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -49,11 +48,7 @@ Result<std::optional<Projection>> projection_of(OGRLayer& layer, const geo::Elli
   if (said == nullptr || said->IsEmpty() || said->IsLocal()) return std::optional<Projection>();
   const char* called = said->GetName();
   if (called != nullptr && std::string_view(called).starts_with("Undefined ")) return std::optional<Projection>();  // of a GeoPackage
-  constexpr std::array<const char*, 2> kFormat{"FORMAT=WKT2_2019", nullptr};
-  char* text = nullptr;
-  said->exportToWkt(&text, kFormat.data());
-  const std::string wkt(text != nullptr ? text : "");
-  CPLFree(text);
+  const std::string wkt = wkt_of(*said);
   OGREnvelope extent;
   const bool has_extent = layer.GetExtent(&extent, TRUE) == OGRERR_NONE && std::isfinite(extent.MinX + extent.MaxX) && std::isfinite(extent.MinY + extent.MaxY);
   const glm::dvec2 centre = has_extent ? glm::dvec2(extent.MinX + extent.MaxX, extent.MinY + extent.MaxY) / 2.0 : glm::dvec2(0.0);
