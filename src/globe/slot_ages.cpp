@@ -31,6 +31,19 @@ source::Catalogue::Sets changed_sets(const Layers& before, const Layers& now) {
 
 }  // namespace
 
+void SlotAges::put(const geo::TileKey& key, Slot slot) {
+  released(key);
+  if (slot.stale) ++stale_count_;
+  slots_.emplace(key, std::move(slot));
+}
+
+void SlotAges::released(const geo::TileKey& key) {
+  const auto found = slots_.find(key);
+  if (found == slots_.end()) return;
+  if (found->second.stale) --stale_count_;
+  slots_.erase(found);
+}
+
 void SlotAges::layers_changed(const surface::SurfaceDescription& before, const surface::SurfaceDescription& now) {
   const Layers& old_layers = part_ == surface::Part::colour ? before.colours : before.heights;
   const Layers& new_layers = part_ == surface::Part::colour ? now.colours : now.heights;
@@ -40,7 +53,10 @@ void SlotAges::layers_changed(const surface::SurfaceDescription& before, const s
   const source::Catalogue::Sets sets = changed_sets(old_layers, new_layers);
   for (const auto& set : sets) changed.push_back(&set->footprint);
   for (auto& [key, slot] : slots_) {
-    if (std::ranges::any_of(changed, [&](const source::Coverage* coverage) { return coverage->touches(key); })) slot.stale = true;
+    if (std::ranges::any_of(changed, [&](const source::Coverage* coverage) { return coverage->touches(key); })) {
+      if (!slot.stale) ++stale_count_;
+      slot.stale = true;
+    }
     slot.retry_at = {};
   }
 }
@@ -58,7 +74,7 @@ bool SlotAges::may_lack(const geo::TileKey& key, const std::vector<std::uint32_t
 SlotAges::Stale SlotAges::find(std::span<const surface::DrawTile> drawn, TimePoint now) {
   ++frame_;
   Stale stale;
-  if (std::ranges::none_of(slots_, [](const auto& slot) { return slot.second.stale; })) return stale;
+  if (stale_count_ == 0) return stale;
   for (const surface::DrawTile& tile : drawn) {
     if (part_ == surface::Part::colour) {
       find(tile.colour_owner, now, stale);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -24,14 +25,14 @@ class SlotAges {
 
   bool holds(const geo::TileKey& key) const { return slots_.contains(key); }
   /// A slot was composed; `current`: of the layers as they are now.
-  void composed(const geo::TileKey& key, bool current) { slots_[key] = Slot{.stale = !current}; }
+  void composed(const geo::TileKey& key, bool current) { put(key, Slot{.stale = !current}); }
   /// The same without these layers (numbers of their sources, ascending): old from the start, and asked for again at `retry_at`.
   void composed_without(const geo::TileKey& key, std::vector<std::uint32_t> missing, TimePoint retry_at) {
-    slots_[key] = Slot{true, false, 0, retry_at, std::move(missing)};
+    put(key, Slot{true, false, 0, retry_at, std::move(missing)});
   }
   /// Whether the slot is better composed without these layers than left as it is: what is shown there now has no more.
   bool may_lack(const geo::TileKey& key, const std::vector<std::uint32_t>& missing) const;
-  void released(const geo::TileKey& key) { slots_.erase(key); }
+  void released(const geo::TileKey& key);
 
   /// Slots that a layer touches whose source has changed show old data from now on.
   void layers_changed(const surface::SurfaceDescription& before, const surface::SurfaceDescription& now);
@@ -59,11 +60,13 @@ class SlotAges {
     TimePoint retry_at{};
     std::vector<std::uint32_t> missing{};  ///< layers that it was composed without
   };
+  void put(const geo::TileKey& key, Slot slot);
   void set_asked(const geo::TileKey& key, bool on);
   void find(const geo::TileKey& key, TimePoint now, Stale& stale);
 
   surface::Part part_;
   std::map<geo::TileKey, Slot> slots_;
+  std::size_t stale_count_ = 0;   ///< of them; mostly 0, and then a frame has nothing to look for
   std::uint64_t frame_ = 0;
 };
 
