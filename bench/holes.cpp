@@ -89,19 +89,17 @@ int background_pixels(Scene& scene, const view::Camera& camera, const globe::Vie
   return count;
 }
 
-/// The number of background pixels so far, and the first view that has some.
+/// The number of background pixels so far, and the views that have some.
 struct Tally {
   std::int64_t pixels = 0;
-  std::int64_t views = 0;
-  std::string first;
+  std::string views;
 
   void add(int count, const HoleView& view) {
+    if (count == 0) return;
     pixels += count;
-    if (count > 0 && views++ == 0) first = fmt::format("--camera={} --exaggeration {}", to_text(view.pose), view.exaggeration);
+    views += fmt::format("{}{} pixels at --camera={} --exaggeration {}", views.empty() ? "" : "; ", count, to_text(view.pose), view.exaggeration);
   }
-  std::string note(int count) const {
-    return views == 0 ? fmt::format("{} views", count) : fmt::format("{} of {} views, the first: {}", views, count, first);
-  }
+  std::string note(int count) const { return fmt::format("{} views{}{}", count, views.empty() ? "" : ": ", views); }
 };
 
 Result<void> measure_holes(const Setting& setting, Report& report) {

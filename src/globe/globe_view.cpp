@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <span>
 #include <thread>
 #include <variant>
 
@@ -95,7 +96,9 @@ struct GlobeView::State {
   bool transitions = false;                 ///< of the last frame's settings
   Clock::time_point last_update = created;
   FrameStats stats;
+  std::vector<surface::DrawTile> draw_list; ///< of the last frame: the cut and the floor below it
 
+  std::span<const surface::DrawTile> to_draw();
   void update(const view::Camera& camera, const ViewSettings& settings, double upload_ms);
   void ask(const surface::TileRequest& request);
   bool submit(const geo::TileKey& key, Part part);
@@ -118,6 +121,13 @@ struct GlobeView::State {
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
   Result<void> load_roots();
 };
+
+std::span<const surface::DrawTile> GlobeView::State::to_draw() {
+  if (selection->floor.empty()) return selection->draw;
+  draw_list.assign(selection->draw.begin(), selection->draw.end());
+  draw_list.insert(draw_list.end(), selection->floor.begin(), selection->floor.end());
+  return draw_list;
+}
 
 bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
   return globe.try_submit([queue = finished, heights = heights, surface = surface, facts = facts, key, part,
@@ -506,7 +516,7 @@ const FrameStats& GlobeView::draw(const view::Camera& camera, const ViewSettings
   const auto start = Clock::now();
   s.update(camera, settings, upload_ms);
   const auto before_draw = Clock::now();
-  const auto figures = s.renderer->draw(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw, framebuffer);
+  const auto figures = s.renderer->draw(s.thread, camera, look_of(settings, s.globe.world(), camera), s.to_draw(), framebuffer);
   s.stats.draw_ms = ms_since(before_draw);
   s.stats.draws = figures.draws;
   s.stats.triangles = figures.triangles;
@@ -535,7 +545,7 @@ bool GlobeView::finish(const view::Camera& camera, const ViewSettings& settings,
 raster::Image GlobeView::picture(const view::Camera& camera, const ViewSettings& settings) {
   State& s = *state_;
   s.selection = &s.tree.select(camera, selection_of(settings, s.max_bytes), Clock::now());
-  return s.renderer->picture(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
+  return s.renderer->picture(s.thread, camera, look_of(settings, s.globe.world(), camera), s.to_draw());
 }
 
 raster::Image GlobeView::last_picture() { return state_->renderer->last_picture(state_->thread); }
@@ -543,7 +553,7 @@ raster::Image GlobeView::last_picture() { return state_->renderer->last_picture(
 render::GeoPicture GlobeView::measure(const view::Camera& camera, const ViewSettings& settings) {
   State& s = *state_;
   s.selection = &s.tree.select(camera, selection_of(settings, s.max_bytes), Clock::now());
-  return s.renderer->measure(s.thread, camera, look_of(settings, s.globe.world(), camera), s.selection->draw);
+  return s.renderer->measure(s.thread, camera, look_of(settings, s.globe.world(), camera), s.to_draw());
 }
 
 bool GlobeView::prepare_switches(const ViewSettings& settings) {
@@ -568,7 +578,7 @@ std::optional<geo::Point<geo::Ecef>> GlobeView::pick(const view::Camera& camera,
   narrow.axes = glm::dmat3(right, glm::cross(right, direction), -direction);
   narrow.vertical_fov = Radians(camera.pixel_angle());
   narrow.width = narrow.height = 1;
-  const auto seen = s.renderer->measure(s.thread, narrow, look_of(settings, s.globe.world(), camera), s.selection->draw);
+  const auto seen = s.renderer->measure(s.thread, narrow, look_of(settings, s.globe.world(), camera), s.to_draw());
   if (!(seen.distance.front() > 0.0)) return std::nullopt;
   return camera.eye + geo::Vector<geo::Ecef>{direction * seen.distance.front()};
 }

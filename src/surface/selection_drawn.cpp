@@ -61,6 +61,21 @@ void DrawnCut::find(const SelectionFrame& frame, std::vector<DrawTile>& tiles, S
   stats.tiles_drawn = static_cast<int>(tiles.size());
 }
 
+void DrawnCut::lay_floor(const SelectionFrame& frame, std::vector<DrawTile>& floor) const {
+  floor.clear();
+  for (const Node& root : pool_.roots()) {
+    const Resident* geometry = root.resident(Part::geometry);
+    if (!root.visible || geometry == nullptr) continue;
+    DrawTile& tile = floor.emplace_back(DrawTile{.key = root.key, .colour_owner = root.key, .colour_before = root.key, .slope_owner = root.key});
+    const TileMetrics& built = geometry->metrics;
+    tile.step = static_cast<std::uint8_t>(built.step_count - 1);
+    tile.skirt_depth = 2 * built.steps[tile.step].curvature;
+    tile.distance = root.distance;
+    tile.sink_level = static_cast<float>(frame.lowest);
+    tile.sink_depth = static_cast<float>(frame.settings.exaggeration * static_cast<double>(built.max_height) - frame.lowest);
+  }
+}
+
 bool DrawnCut::draw(const SelectionFrame& frame, Node& node) {
   if (!node.visible) return true;
   if (node.split && draw_children(frame, node)) return true;

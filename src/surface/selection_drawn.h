@@ -20,6 +20,10 @@ class DrawnCut {
   /// Fills `tiles`, sorted front to back, and the drawn part of `stats`.
   void find(const SelectionFrame& frame, std::vector<DrawTile>& tiles, SelectionStats& stats);
 
+  /// The roots in view, laid flat as deep as the deepest ground: for frames in which tiles stand in for finer ones. Such a tile may lie
+  /// lower than the true surface, and show past its border where what is drawn of its neighbour is out of view.
+  void lay_floor(const SelectionFrame& frame, std::vector<DrawTile>& floor) const;
+
   /// Whether a fade or morph is under way.
   bool in_transition() const { return in_transition_; }
 

@@ -77,11 +77,12 @@ SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const Sele
                           FrameNumber number, FrameNumber last, TimePoint now) {
   double lowest = 0;
   for (const Node& root : pool.roots()) lowest = std::min<double>(lowest, root.facts.min_height);
+  lowest *= settings.exaggeration;
   const ErrorView errors{camera.eye.xyz, camera.pixel_angle(), settings.exaggeration, settings.anisotropy,
                          pool.ellipsoid().a()};
   return {number, last, now, settings, errors, make_view_volume(camera),
-          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest * settings.exaggeration),
-          geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value};
+          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest),
+          geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value, lowest};
 }
 
 void WantedCut::see(const SelectionFrame& frame, Node& node) const {

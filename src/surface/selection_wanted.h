@@ -17,6 +17,7 @@ struct SelectionFrame {
   ViewVolume volume;
   Horizon horizon;
   double eye_height = 0;       ///< metres above the ellipsoid
+  double lowest = 0;           ///< of all heights displayed, at most 0
   float transition_step = 1;   ///< share of a transition that passes in this frame
   bool was_drawn(const Node& node) const { return node.drawn == last; }
 };

@@ -73,6 +73,8 @@ const Selection& TileTree::select(const view::Camera& camera, const SelectionSet
   s.drawn.find(frame, s.selection.draw, stats);
   s.requests.find(frame, s.selection.requests, stats);
   stats.complete = stats.tiles_waiting == 0 && stats.tiles_drawn == stats.tiles_selected && !s.drawn.in_transition();
+  s.selection.floor.clear();
+  if (!stats.complete) s.drawn.lay_floor(frame, s.selection.floor);
   s.pool.prune(s.frame, now);
   return s.selection;
 }

@@ -57,6 +57,7 @@ struct SelectionStats {
 
 struct Selection {
   std::vector<DrawTile> draw;         ///< sorted front to back, ties by key
+  std::vector<DrawTile> floor;        ///< to be drawn below all of it; empty once complete
   std::vector<TileRequest> requests;  ///< not yet started, at most a few hundred
   SelectionStats stats;
 };

@@ -178,6 +178,47 @@ TEST_CASE("select: in every frame of any loading the drawn tiles cover what is s
   CHECK(seen > 20000);
 }
 
+TEST_CASE("select: until the picture is complete, roots lie as a floor under every ray that meets the deepest ground") {
+  const std::uint64_t seed = 6;
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<> unit(0, 1);
+  int seen = 0, complete = 0;
+  for (int i = 0; i < 12; ++i) {
+    const EvenPlanet planet;
+    Flight flight(planet, random());
+    SelectionSettings settings;
+    settings.exaggeration = i % 3 == 0 ? 100 : 1;
+    settings.sse_px = 8;
+    const double lowest = settings.exaggeration * -planet.relief;
+    const view::Camera camera = random_camera(planet.ellipsoid, random, 20000);
+    for (int frame = 0; frame < 40; ++frame) {
+      const Selection& selection = flight.frame(camera, settings, 40, 20);
+      if (selection.stats.complete) {
+        ++complete;
+        REQUIRE(selection.floor.empty());
+        continue;
+      }
+      for (const DrawTile& tile : selection.floor) {
+        REQUIRE(tile.key.level == 0);
+        REQUIRE(tile.sink_level == doctest::Approx(lowest));
+        REQUIRE(tile.sink_depth >= settings.exaggeration * 0.9 * planet.relief - lowest);
+      }
+      for (int point = 0; point < 20; ++point) {
+        const geo::Vector<geo::Ecef> ray = camera.ray({1280 * unit(random), 720 * unit(random)});
+        const double distance = geo::intersect_ray(planet.ellipsoid, Metres(lowest), camera.eye, ray);
+        if (distance < 0) continue;
+        const geo::Geodetic hit = geo::to_geodetic(planet.ellipsoid, camera.eye + ray * distance);
+        const int face = geo::face_point(geo::normal_at(geo::place_of(hit))).face;
+        REQUIRE(std::ranges::count(selection.floor, face, [](const DrawTile& tile) { return static_cast<int>(tile.key.face); }) == 1);
+        ++seen;
+      }
+    }
+  }
+  CHECK(seen > 500);
+  CHECK(complete > 0);
+}
+
 TEST_CASE("select: a finished picture does not depend on the way there") {
   const std::uint64_t seed = 77;
   CAPTURE(seed);
