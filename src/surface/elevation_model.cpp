@@ -47,13 +47,31 @@ double spacing_of_level(const source::RasterDescription& raster, int level) {
   return std::ldexp(raster.spacing.value, level);
 }
 
+/// The step in which voids are filled from levels of such a spacing (metres): one for every octave.
+int step_of(double spacing) { return std::ilogb(spacing); }
+
 void compose_one(double& below, const cache::HeightSample& sample, bool adds) {
   below += sample.coverage * (adds ? sample.metres : sample.metres - below);
 }
 
+/// Lays `lower` under what there is.
+void lay_under(cache::HeightSample& upper, const cache::HeightSample& lower, double whole = 1.0) {
+  const double added = (whole - upper.coverage) * lower.coverage;
+  if (added <= 0.0) return;
+  const double coverage = upper.coverage + added;
+  upper.metres += (lower.metres - upper.metres) * (added / coverage);
+  upper.coverage = lower.coverage >= 1.0 ? whole : coverage;
+}
+
 bool is_finite(const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); }
 
-/// The place within the raster nearest to a pixel, and the share of the raster's coverage that is left there.
+/// Pixels of a level per pixel of level 0; each level after the raster's last halves them (see CoarseHeights).
+glm::dvec2 scale_of_level(const source::RasterDescription& raster, int level) {
+  const int last = static_cast<int>(raster.levels.size()) - 1;
+  return source::level_scale(raster, std::min(level, last)) * std::ldexp(1.0, std::min(last - level, 0));
+}
+
+/// The place within the raster nearest to a pixel, and the share of a level's coverage that is left there.
 struct WithinRaster {
   glm::dvec2 pixel;
   double reach = 1.0;
@@ -62,7 +80,7 @@ WithinRaster bring_within(const source::RasterDescription& raster, int level, co
   const source::LevelSize& full = raster.levels.front();
   glm::dvec2 nearest = glm::clamp(pixel, glm::dvec2(0.0), glm::dvec2(full.width, full.height));
   if (raster.wraps) nearest.x = pixel.x;
-  const glm::dvec2 beyond = glm::abs(pixel - nearest) * source::level_scale(raster, level);
+  const glm::dvec2 beyond = glm::abs(pixel - nearest) * scale_of_level(raster, level);
   return {nearest, std::max(0.0, 1.0 - beyond.x) * std::max(0.0, 1.0 - beyond.y)};
 }
 
@@ -124,6 +142,7 @@ source::FaceRegion region_of(const TileLattice& lattice) {
 
 void ElevationModel::choose(const source::FaceRegion& region, double wanted_spacing) {
   contributors_.clear();
+  region_ = region;
   close_unused();
   const Radians least(kNarrowestDataSet * wanted_spacing / description_->ellipsoid.a());
   for (const Layer& layer : description_->heights) {
@@ -202,8 +221,10 @@ struct ElevationModel::Batch {
   std::span<double> metres;
   std::span<double> spacings;  ///< of the finest layer that contributed
 
-  /// Fills `inside` and `pixels` of a contributor's samples, with those of `which` that it reaches.
-  virtual void find(HeightLayer& layer, std::size_t contributor, std::span<const std::uint32_t> which) = 0;
+  /// Fills `inside` and `pixels` of a raster's samples, with those of `which` that it reaches.
+  virtual void find(HeightLayer& layer, std::span<const std::uint32_t> which) = 0;
+  /// Where `which` lie in a raster, or beyond its borders.
+  virtual void to_pixels(HeightLayer& layer, std::span<const std::uint32_t> which, std::vector<glm::dvec2>& pixels) = 0;
 
  protected:
   Batch(double wanted, std::span<double> m, std::span<double> s) : wanted_spacing(wanted), metres(m), spacings(s) {}
@@ -214,8 +235,8 @@ struct ElevationModel::PlaceBatch final : Batch {
   PlaceBatch(std::span<const geo::LatLon> p, std::vector<geo::LatLon>& room, double wanted, std::span<double> m, std::span<double> s)
       : Batch(wanted, m, s), places(p), inside_places(room) {}
 
-  void find(HeightLayer& layer, std::size_t, std::span<const std::uint32_t> which) override {
-    LayerSamples& out = layer.samples;
+  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
+    RasterSamples& out = layer.samples;
     inside_places.clear();
     for (const std::uint32_t i : which) {
       if (!holds(layer.reach, places[i])) continue;
@@ -226,14 +247,20 @@ struct ElevationModel::PlaceBatch final : Batch {
     layer.raster.reader().to_pixels(inside_places, out.pixels);
   }
 
+  void to_pixels(HeightLayer& layer, std::span<const std::uint32_t> which, std::vector<glm::dvec2>& pixels) override {
+    inside_places.clear();
+    for (const std::uint32_t i : which) inside_places.push_back(places[i]);
+    pixels.resize(which.size());
+    layer.raster.reader().to_pixels(inside_places, pixels);
+  }
+
   std::span<const geo::LatLon> places;
   std::vector<geo::LatLon>& inside_places;
 };
 
 /// Some rows of a lattice.
 struct ElevationModel::LatticeBatch final : Batch {
-  LatticeBatch(const TileLattice& lattice, std::size_t contributors, std::vector<glm::dvec2>& r, double wanted)
-      : Batch(wanted, {}, {}), points(lattice), in_rasters(contributors), room(r) {}
+  LatticeBatch(const TileLattice& lattice, std::vector<glm::dvec2>& r, double wanted) : Batch(wanted, {}, {}), points(lattice), room(r) {}
 
   void choose_rows(int first, std::span<double> m, std::span<double> s) {
     first_row = first;
@@ -241,18 +268,14 @@ struct ElevationModel::LatticeBatch final : Batch {
     spacings = s;
   }
 
-  void find(HeightLayer& layer, std::size_t contributor, std::span<const std::uint32_t> which) override {
+  void find(HeightLayer& layer, std::span<const std::uint32_t> which) override {
     if (!overlap(points.bounds(), layer.reach)) return;
-    const source::RasterDescription& raster = layer.raster.description();
-    const int level = level_for_spacing(raster, wanted_spacing);
-    std::optional<LatticePixels::InRaster>& in_raster = in_rasters[contributor];
-    if (!in_raster) in_raster = points.in_raster(layer.raster.reader(), raster, level);
-    room.resize(metres.size());
-    in_raster->rows(first_row, room);
+    find_rows(layer);
     // A pixel beyond the border coverage ends.
-    const glm::dvec2 lowest = -1.0 / source::level_scale(raster, level);
+    const source::RasterDescription& raster = layer.raster.description();
+    const glm::dvec2 lowest = -1.0 / source::level_scale(raster, level_for_spacing(raster, wanted_spacing));
     const glm::dvec2 highest = glm::dvec2(raster.levels.front().width, raster.levels.front().height) - lowest;
-    LayerSamples& out = layer.samples;
+    RasterSamples& out = layer.samples;
     for (const std::uint32_t i : which) {
       const glm::dvec2& pixel = room[i];
       const bool in_x = raster.wraps || (pixel.x > lowest.x && pixel.x < highest.x);
@@ -262,9 +285,26 @@ struct ElevationModel::LatticeBatch final : Batch {
     }
   }
 
+  void to_pixels(HeightLayer& layer, std::span<const std::uint32_t> which, std::vector<glm::dvec2>& pixels) override {
+    find_rows(layer);
+    pixels.clear();
+    for (const std::uint32_t i : which) pixels.push_back(room[i]);
+  }
+
+  /// Fills `room` with all of the rows.
+  void find_rows(HeightLayer& layer) {
+    auto found = in_rasters.find(&layer);
+    if (found == in_rasters.end()) {
+      const source::RasterDescription& raster = layer.raster.description();
+      found = in_rasters.emplace(&layer, points.in_raster(layer.raster.reader(), raster, level_for_spacing(raster, wanted_spacing))).first;
+    }
+    room.resize(metres.size());
+    found->second.rows(first_row, room);
+  }
+
   int first_row = 0;
   LatticePixels points;
-  std::vector<std::optional<LatticePixels::InRaster>> in_rasters;  ///< of the contributors
+  std::unordered_map<const HeightLayer*, LatticePixels::InRaster> in_rasters;
   std::vector<glm::dvec2>& room;
 };
 
@@ -319,7 +359,7 @@ Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_s
   assert(metres.size() == static_cast<std::size_t>(lattice.side) * static_cast<std::size_t>(lattice.side));
   const int rows_at_once = std::max(1, static_cast<int>(kPlacesAtOnce) / lattice.side);
   choose(region_of(lattice), wanted_spacing);
-  LatticeBatch batch(lattice, contributors_.size(), lattice_pixels_, wanted_spacing);
+  LatticeBatch batch(lattice, lattice_pixels_, wanted_spacing);
   for (int row = 0; row < lattice.side; row += rows_at_once) {
     const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(lattice.side);
     const auto count = static_cast<std::size_t>(std::min(rows_at_once, lattice.side - row)) * static_cast<std::size_t>(lattice.side);
@@ -330,8 +370,8 @@ Result<void> ElevationModel::heights(const TileLattice& lattice, double wanted_s
   return {};
 }
 
-/// Heights at the places `which`, by the lowest `count` contributors. Those below are asked, and opened, only where the uppermost of
-/// these does not hide them.
+/// Heights at the places `which`, by the lowest `count` contributors. Those below a layer are asked, and opened, only where it does not
+/// hide them.
 Result<void> ElevationModel::compose(Batch& batch, std::size_t count, std::span<const std::uint32_t> which) {
   if (which.empty()) return {};
   if (count == 0) {
@@ -341,89 +381,174 @@ Result<void> ElevationModel::compose(Batch& batch, std::size_t count, std::span<
     }
     return {};
   }
-  HeightLayer* opened = open(contributors_[count - 1]);
-  if (opened == nullptr) return compose(batch, count - 1, which);
-  HeightLayer& layer = *opened;
-  LayerSamples& samples = layer.samples;
-  samples.inside.clear();
-  samples.pixels.clear();
-  batch.find(layer, count - 1, which);
-  if (samples.inside.empty()) return compose(batch, count - 1, which);
+  const Layer& layer = *contributors_[count - 1].settings;
+  std::size_t first = count - 1;
+  while (first > 0 && contributors_[first - 1].settings == &layer) --first;
+  const std::span rasters = std::span(contributors_).subspan(first, count - first);
 
-  const int level = level_for_spacing(layer.raster.description(), batch.wanted_spacing);
-  const bool adds = contributors_[count - 1].settings->adds;
-  samples.heights.resize(samples.inside.size());
-  if (Result<void> read = layer.raster.sample_heights(level, samples.pixels, samples.heights); !read) return read;
-
-  samples.finest.assign(samples.inside.size(), spacing_of_level(layer.raster.description(), level));
-
-  samples.open.clear();
-  samples.below.clear();
-  std::size_t n = 0;  // of the places inside, which are in the order of `which`
-  for (const std::uint32_t i : which) {
-    if (n == samples.inside.size() || samples.inside[n] != i) {
-      samples.below.push_back(i);
-      continue;
-    }
-    if (samples.heights[n].coverage >= 1.0 && !adds) {
-      batch.metres[i] = samples.heights[n].metres;
-      batch.spacings[i] = samples.finest[n];
-    } else {
-      samples.below.push_back(i);
-      samples.open.push_back(static_cast<std::uint32_t>(n));
-    }
-    ++n;
+  LayerAnswer& answer = answers_[&layer];
+  if (Result<void> asked = ask_layer(batch, rasters, which, answer); !asked) return asked;
+  if (Result<void> composed = compose(batch, first, answer.undecided); !composed) return composed;
+  if (!layer.adds) {
+    if (Result<void> filled = fill_voids(batch, std::span(contributors_).subspan(first, count - first), answer.open); !filled) return filled;
   }
-  if (Result<void> composed = compose(batch, count - 1, samples.below); !composed) return composed;
-  // Voids of a catalogue's rasters show what lies below: filled from their own coarser levels, neighbours would not meet.
-  if (!adds && !contributors_[count - 1].settings->catalogue) {
-    if (Result<void> filled = fill_voids(layer, level, batch.spacings); !filled) return filled;
-  }
-  for (const std::uint32_t open : samples.open) {
-    const std::uint32_t i = samples.inside[open];
-    const cache::HeightSample& sample = samples.heights[open];
-    compose_one(batch.metres[i], sample, adds);
-    if (sample.coverage > 0.0) batch.spacings[i] = std::min(batch.spacings[i], samples.finest[open]);
+  for (const OpenPlace& open : answer.open) {
+    compose_one(batch.metres[open.place], open.height, layer.adds);
+    if (open.height.coverage > 0.0) batch.spacings[open.place] = std::min(batch.spacings[open.place], open.finest);
   }
   return {};
 }
 
-/// Fills a layer's voids from its coarser levels, as far as those are finer than what lies below (`spacings`).
-Result<void> ElevationModel::fill_voids(HeightLayer& layer, int level, std::span<double> spacings) {
-  const source::RasterDescription& raster = layer.raster.description();
-  LayerSamples& samples = layer.samples;
-  const auto reach = [&](std::uint32_t n) { return bring_within(raster, level, samples.pixels[n]).reach; };
-  samples.voids.clear();
-  for (const std::uint32_t n : samples.open) {
-    if (is_finite(samples.pixels[n]) && reach(n) > 0.0) samples.voids.push_back(n);
+/// What the rasters of a layer, uppermost last, say of `which`: answers those places that its uppermost raster hides, leaves the others it
+/// reaches in `open`, and in `undecided` all to which layers below contribute.
+Result<void> ElevationModel::ask_layer(Batch& batch, std::span<Contributor> rasters, std::span<const std::uint32_t> which, LayerAnswer& answer) {
+  const bool adds = rasters.front().settings->adds;
+  answer.open.clear();
+  answer.open_of.assign(batch.metres.size(), -1);
+  answer.undecided.assign(which.begin(), which.end());
+  for (Contributor& contributor : std::views::reverse(rasters)) {
+    if (answer.undecided.empty()) break;
+    HeightLayer* const raster = open(contributor);
+    if (raster == nullptr) continue;
+    RasterSamples& samples = raster->samples;
+    samples.inside.clear();
+    samples.pixels.clear();
+    batch.find(*raster, answer.undecided);
+    if (samples.inside.empty()) continue;
+    const source::RasterDescription& about = raster->raster.description();
+    const int level = level_for_spacing(about, batch.wanted_spacing);
+    const double spacing = spacing_of_level(about, level);
+    samples.heights.resize(samples.inside.size());
+    if (Result<void> read = raster->raster.sample_heights(level, samples.pixels, samples.heights); !read) return read;
+
+    answer.next.clear();
+    std::size_t n = 0;  // of the places inside, which are in the order of the undecided
+    for (const std::uint32_t i : answer.undecided) {
+      if (n == samples.inside.size() || samples.inside[n] != i) {
+        answer.next.push_back(i);
+        continue;
+      }
+      const cache::HeightSample& sample = samples.heights[n];
+      const glm::dvec2& pixel = samples.pixels[n++];
+      std::int32_t& known = answer.open_of[i];
+      if (known < 0 && sample.coverage >= 1.0 && !adds) {
+        batch.metres[i] = sample.metres;
+        batch.spacings[i] = spacing;
+        continue;
+      }
+      if (known < 0) {
+        known = static_cast<std::int32_t>(answer.open.size());
+        answer.open.push_back({.place = i, .finest = std::numeric_limits<double>::infinity()});
+      }
+      OpenPlace& open = answer.open[static_cast<std::size_t>(known)];
+      if (is_finite(pixel)) open.reach = std::max(open.reach, bring_within(about, level, pixel).reach);
+      if (sample.coverage > 0.0) open.finest = std::min(open.finest, spacing);
+      lay_under(open.height, sample);
+      if (open.height.coverage < 1.0) {
+        answer.next.push_back(i);
+      } else if (!adds) {  // hidden by several together
+        batch.metres[i] = 0.0;
+        batch.spacings[i] = std::numeric_limits<double>::infinity();
+      }
+    }
+    std::swap(answer.undecided, answer.next);
   }
-  for (int coarse = level + 1; coarse <= kCoarsestFill && !samples.voids.empty(); ++coarse) {
-    const double spacing = spacing_of_level(raster, coarse);
-    std::erase_if(samples.voids, [&](std::uint32_t n) {
-      return spacing > spacings[samples.inside[n]] || samples.heights[n].coverage >= reach(n);
-    });
-    samples.void_pixels.clear();
-    for (const std::uint32_t n : samples.voids) samples.void_pixels.push_back(bring_within(raster, level, samples.pixels[n]).pixel);
-    samples.void_heights.resize(samples.voids.size());
-    if (Result<void> read = sample_voids(layer, coarse); !read) return read;
-    for (std::size_t v = 0; v < samples.voids.size(); ++v) {
-      cache::HeightSample& sample = samples.heights[samples.voids[v]];
-      const cache::HeightSample& fill = samples.void_heights[v];
-      const double added = (reach(samples.voids[v]) - sample.coverage) * fill.coverage;
-      if (added <= 0.0) continue;
-      if (sample.coverage == 0.0) samples.finest[samples.voids[v]] = spacing;
-      const double coverage = sample.coverage + added;
-      sample.metres += (fill.metres - sample.metres) * (added / coverage);
-      sample.coverage = coverage;
+  if (adds) {
+    for (const OpenPlace& open : answer.open) {
+      if (open.height.coverage >= 1.0) answer.undecided.push_back(open.place);
     }
   }
   return {};
 }
 
-/// Samples of a level at the layer's void_pixels, whether the raster has that level or not.
-Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
+/// Fills a layer's voids from coarser levels of its rasters, as far as those are finer than what lies below. One step of twice the spacing
+/// after the other, each from all rasters together, so that neighbours meet: steps and levels depend on nothing but the place.
+Result<void> ElevationModel::fill_voids(Batch& batch, std::span<Contributor> rasters, std::vector<OpenPlace>& open) {
+  voids_.clear();
+  void_places_.clear();
+  double coarsest = 0.0;
+  for (OpenPlace& place : open) {
+    if (!place.is_void()) continue;
+    voids_.push_back(&place);
+    void_places_.push_back(place.place);
+    coarsest = std::max(coarsest, batch.spacings[place.place]);
+  }
+  if (voids_.empty()) return {};
+  choose_fillers(batch, rasters, coarsest);
+  int first = std::numeric_limits<int>::max(), last = std::numeric_limits<int>::min();
+  for (const Filler& filler : fillers_) {
+    const double spacing = filler.raster->raster.description().spacing.value;
+    first = std::min(first, step_of(spacing) + filler.level + 1);
+    last = std::max(last, step_of(std::min(coarsest, std::ldexp(spacing, kCoarsestFill))));
+  }
+  for (int step = first; step <= last; ++step) {
+    fills_.assign(voids_.size(), {});
+    for (const Filler& filler : fillers_) {
+      const int level = step - step_of(filler.raster->raster.description().spacing.value);
+      if (level <= filler.level || level > kCoarsestFill) continue;
+      if (Result<void> filled = fill_from(filler, level, batch.spacings); !filled) return filled;
+    }
+    for (std::size_t v = 0; v < voids_.size(); ++v) {
+      if (fills_[v].coverage <= 0.0) continue;
+      lay_under(voids_[v]->height, fills_[v], voids_[v]->reach);
+    }
+  }
+  return {};
+}
+
+/// The rasters of a layer that reach the batch's region at their coarser levels too.
+void ElevationModel::choose_fillers(Batch& batch, std::span<Contributor> rasters, double farthest) {
+  fillers_.clear();
+  const auto add = [&](HeightLayer* raster) {
+    if (raster == nullptr) return;
+    const int level = level_for_spacing(raster->raster.description(), batch.wanted_spacing);
+    if (level >= kCoarsestFill || spacing_of_level(raster->raster.description(), level + 1) > farthest) return;
+    Filler& filler = fillers_.emplace_back(Filler{raster, level, {}});
+    batch.to_pixels(*raster, void_places_, filler.pixels);
+  };
+  const Layer& layer = *rasters.front().settings;
+  if (!layer.catalogue) return add(rasters.front().raster);
+  double widest = 0.0;
+  for (const Contributor& contributor : rasters) {
+    widest = std::max(widest, std::ldexp(layer.catalogue->sets()[contributor.index]->footprint.spacing().value, kCoarsestFill));
+  }
+  constexpr double kFaceUnitsPerRadian = 2.5;  // 4 / pi, and more: near a corner a unit is shorter
+  const glm::dvec2 margin(std::min(kFaceUnitsPerRadian * std::min(widest, farthest) / description_->ellipsoid.b(), 1.0));
+  const source::FaceRegion wider = source::region_of(region_.face, {region_.rect.lower - margin, region_.rect.upper + margin});
+  layer.catalogue->find(wider, Radians(kNarrowestDataSet * batch.wanted_spacing / description_->ellipsoid.a()), found_);
+  if (found_.size() > kMostContributors) found_.resize(kMostContributors);
+  for (const std::uint32_t index : found_) add(open_data_set(*layer.catalogue, index));
+}
+
+/// Lays a level of a raster under `fills_`, where it is finer than what lies below (`spacings`).
+Result<void> ElevationModel::fill_from(const Filler& filler, int level, std::span<const double> spacings) {
+  const source::RasterDescription& about = filler.raster->raster.description();
+  const double spacing = spacing_of_level(about, level);
+  reached_.clear();
+  void_pixels_.clear();
+  for (std::uint32_t v = 0; v < voids_.size(); ++v) {
+    const OpenPlace& place = *voids_[v];
+    if (spacing > spacings[place.place] || !place.is_void() || fills_[v].coverage >= 1.0 || !is_finite(filler.pixels[v])) continue;
+    const WithinRaster within = bring_within(about, level, filler.pixels[v]);
+    if (within.reach <= 0.0) continue;
+    reached_.push_back(v);
+    void_pixels_.push_back(within.pixel);
+  }
+  void_heights_.resize(reached_.size());
+  if (Result<void> read = sample_level(*filler.raster, level, void_pixels_, void_heights_); !read) return read;
+  for (std::size_t n = 0; n < reached_.size(); ++n) {
+    void_heights_[n].coverage *= bring_within(about, level, filler.pixels[reached_[n]]).reach;
+    OpenPlace& place = *voids_[reached_[n]];
+    if (place.height.coverage == 0.0 && void_heights_[n].coverage > 0.0) place.finest = std::min(place.finest, spacing);
+    lay_under(fills_[reached_[n]], void_heights_[n]);
+  }
+  return {};
+}
+
+/// Samples of a level within the raster, whether the raster has that level or not.
+Result<void> ElevationModel::sample_level(HeightLayer& layer, int level, std::span<const glm::dvec2> pixels, std::span<cache::HeightSample> heights) {
   const int last = static_cast<int>(layer.raster.description().levels.size()) - 1;
-  if (level <= last) return layer.raster.sample_heights(level, layer.samples.void_pixels, layer.samples.void_heights);
+  if (level <= last) return layer.raster.sample_heights(level, pixels, heights);
   while (static_cast<int>(layer.beyond.size()) < level - last) {
     if (layer.beyond.empty()) {
       const Result<CoarseHeights> known = last_level(layer.raster);
@@ -433,9 +558,8 @@ Result<void> ElevationModel::sample_voids(HeightLayer& layer, int level) {
       layer.beyond.push_back(next_level(layer.beyond.back()));
     }
   }
-  const CoarseHeights& heights = layer.beyond[static_cast<std::size_t>(level - last - 1)];
-  std::transform(layer.samples.void_pixels.begin(), layer.samples.void_pixels.end(), layer.samples.void_heights.begin(),
-                 [&](const glm::dvec2& pixel) { return heights.sample(pixel); });
+  const CoarseHeights& coarse = layer.beyond[static_cast<std::size_t>(level - last - 1)];
+  std::ranges::transform(pixels, heights.begin(), [&](const glm::dvec2& pixel) { return coarse.sample(pixel); });
   return {};
 }
 
@@ -454,7 +578,9 @@ Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Look
     double spacing;
   };
   std::vector<Answered> from_the_top;
+  const Layer* answered_by = nullptr;
   for (Contributor& contributor : std::views::reverse(contributors_)) {
+    if (contributor.settings == answered_by) continue;  // of several rasters of a layer only the uppermost counts
     HeightLayer* opened = open(contributor);
     if (opened == nullptr || !holds(opened->reach, place)) continue;
     HeightLayer& layer = *opened;
@@ -473,7 +599,10 @@ Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Look
     cache::HeightSample sample;
     if (Result<void> read = layer.raster.sample_heights(level, {&pixel, 1}, {&sample, 1}); !read) return read.error();
     const bool adds = contributor.settings->adds;
-    if (sample.coverage > 0.0) from_the_top.push_back({sample, adds, spacing_of_level(raster, level)});
+    if (sample.coverage > 0.0) {
+      from_the_top.push_back({sample, adds, spacing_of_level(raster, level)});
+      answered_by = contributor.settings;
+    }
     if (sample.coverage >= 1.0 && !adds) break;  // hides what lies below
   }
   for (const Answered& answered : std::views::reverse(from_the_top)) {

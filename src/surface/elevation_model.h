@@ -67,10 +67,10 @@ struct ElevationAnswer {
 };
 
 /// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
-/// continuous across voids and borders; 0 where there is nothing. A void inside a layer shows the finest data that there are:
-/// the layer's own coarser levels, made of the samples round the void, as long as they are finer than the layers below (not
-/// beyond level kCoarsestFill); then those layers. So a hole in a mountain's samples is no pit down to a coarse globe. Voids of a
-/// catalogue's rasters show what lies below them.
+/// continuous across voids and borders; 0 where there is nothing. The rasters of a catalogue are one layer: the finer (or the one named
+/// later) replaces the others. A void inside a layer shows the finest data that there are: the layer's own coarser levels, made of the
+/// samples round the void, as long as they are finer than the layers below (not beyond level kCoarsestFill); then those layers. So
+/// a hole in a mountain's samples is no pit down to a coarse globe.
 class ElevationModel {
  public:
   static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
@@ -101,17 +101,11 @@ class ElevationModel {
   Result<void> for_each_under(const geo::TileKey& key, const Visit& visit);
 
  private:
-  /// What one layer says at the places of a batch that it reaches. The vectors are kept between calls.
-  struct LayerSamples {
+  /// What one raster says at the places of a batch that it reaches. The vectors are kept between calls.
+  struct RasterSamples {
     std::vector<std::uint32_t> inside;    ///< the places, as indices into the batch
     std::vector<glm::dvec2> pixels;       ///< of `inside`
     std::vector<cache::HeightSample> heights;
-    std::vector<double> finest;           ///< spacing of the level that answered
-    std::vector<std::uint32_t> open;      ///< indices into `inside`: places to which layers below contribute too
-    std::vector<std::uint32_t> below;     ///< places of the batch that layers below have to answer
-    std::vector<std::uint32_t> voids;     ///< indices into `inside`: those that lack some data at the level tried last
-    std::vector<glm::dvec2> void_pixels;
-    std::vector<cache::HeightSample> void_heights;
   };
   /// An open raster: a layer's, or one of a catalogue.
   struct HeightLayer {
@@ -119,13 +113,35 @@ class ElevationModel {
     cache::CachedRaster raster;
     geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
     std::vector<CoarseHeights> beyond; ///< levels after the raster's last, made when a void asks for them
-    LayerSamples samples;
+    RasterSamples samples;
   };
   /// A raster that may contribute to the batch at hand.
   struct Contributor {
     const Layer* settings = nullptr;
     HeightLayer* raster = nullptr;     ///< null: of a catalogue, not opened yet
     std::uint32_t index = 0;           ///< in its catalogue
+  };
+  /// A place that a layer reaches but does not hide by its uppermost raster alone.
+  struct OpenPlace {
+    std::uint32_t place = 0;           ///< as an index into the batch
+    cache::HeightSample height{};      ///< of the layer's rasters together
+    double reach = 0;                  ///< the coverage that there would be without voids
+    double finest = 0;                 ///< spacing of the finest level that answered
+
+    bool is_void() const { return height.coverage < reach - 1e-9; }
+  };
+  /// What a layer says at the places of a batch. The vectors are kept between calls.
+  struct LayerAnswer {
+    std::vector<OpenPlace> open;
+    std::vector<std::int32_t> open_of;      ///< by place, index into `open`; -1: none
+    std::vector<std::uint32_t> undecided;   ///< places to which lower rasters contribute
+    std::vector<std::uint32_t> next;
+  };
+  /// A raster that fills voids.
+  struct Filler {
+    HeightLayer* raster = nullptr;
+    int level = 0;                          ///< at which it answered
+    std::vector<glm::dvec2> pixels;         ///< of the voids
   };
   struct Batch;
   struct PlaceBatch;
@@ -139,8 +155,11 @@ class ElevationModel {
   HeightLayer* open_data_set(const source::Catalogue& catalogue, std::uint32_t index);
   void close_unused();
   Result<void> compose(Batch& batch, std::size_t count, std::span<const std::uint32_t> which);
-  Result<void> fill_voids(HeightLayer& layer, int level, std::span<double> spacings);
-  Result<void> sample_voids(HeightLayer& layer, int level);
+  Result<void> ask_layer(Batch& batch, std::span<Contributor> rasters, std::span<const std::uint32_t> which, LayerAnswer& answer);
+  Result<void> fill_voids(Batch& batch, std::span<Contributor> rasters, std::vector<OpenPlace>& open);
+  void choose_fillers(Batch& batch, std::span<Contributor> rasters, double farthest);
+  Result<void> fill_from(const Filler& filler, int level, std::span<const double> spacings);
+  Result<void> sample_level(HeightLayer& layer, int level, std::span<const glm::dvec2> pixels, std::span<cache::HeightSample> heights);
   std::span<const std::uint32_t> all_of(std::size_t count);
 
   std::shared_ptr<const SurfaceDescription> description_;
@@ -150,6 +169,7 @@ class ElevationModel {
   std::list<std::pair<std::uint32_t, HeightLayer>> data_sets_;  ///< open ones of catalogues by their number, the last used first
   std::unordered_map<std::uint32_t, std::list<std::pair<std::uint32_t, HeightLayer>>::iterator> data_set_index_;
   std::vector<Contributor> contributors_;  ///< to the batch at hand, lowest first
+  source::FaceRegion region_;              ///< that holds it
   std::vector<std::uint32_t> found_;
   // Kept between calls: one allocation serves all batches.
   std::vector<geo::LatLon> places_;
@@ -157,6 +177,14 @@ class ElevationModel {
   std::vector<double> spacings_;
   std::vector<std::uint32_t> numbers_;
   std::vector<glm::dvec2> lattice_pixels_;
+  std::unordered_map<const Layer*, LayerAnswer> answers_;
+  std::vector<OpenPlace*> voids_;
+  std::vector<Filler> fillers_;            ///< uppermost first
+  std::vector<cache::HeightSample> fills_; ///< of the voids, by one step of levels
+  std::vector<std::uint32_t> reached_;
+  std::vector<std::uint32_t> void_places_;
+  std::vector<glm::dvec2> void_pixels_;
+  std::vector<cache::HeightSample> void_heights_;
 };
 
 /// The coarsest level of a raster whose samples are at most `wanted_spacing` metres apart; 0 if none is.
