@@ -18,6 +18,7 @@ enum class Command : std::uint8_t {
   statistics,
   layers,
   settings,
+  save_layers,
   wireframe,
   bounds,
   tile_borders,

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <deque>
+#include <memory>
 #include <string>
 
 #include "globe/api.h"
@@ -15,6 +17,9 @@ std::string text_of_bytes(double bytes);
 std::string text_of_metres(double metres);
 /// "46.5000 N  8.0000 E".
 std::string text_of_place(const geo::LatLon& place);
+
+/// What a layer shows, if it is open.
+std::shared_ptr<const source::RasterSource> raster_of(const globe::Globe& globe, std::size_t layer);
 
 /// How fast a figure grows, over the last two seconds. For figures that are looked at now and then.
 class Rate {

@@ -85,11 +85,13 @@ void switch_button(const char* label, const char* tip, bool& on) {
 std::vector<std::string> attributions(const globe::Globe& globe) {
   std::vector<std::string> lines;
   std::string names;
-  for (const globe::LayerInfo& layer : globe.layers()) {
-    if (!layer.spec.enabled) continue;
-    std::string credit = layer.spec.attribution;
-    if (credit.empty() && layer.raster) credit = layer.raster->description().attribution;
-    if (credit.empty()) names += (names.empty() ? "" : " \xC2\xB7 ") + layer.spec.name;
+  for (std::size_t i = 0; i < globe.layers().size(); ++i) {
+    if (!globe.layer_settings(i).enabled) continue;
+    const globe::LayerSpec& spec = globe.layers()[i].spec;
+    const auto raster = raster_of(globe, i);
+    std::string credit = spec.attribution;
+    if (credit.empty() && raster) credit = raster->description().attribution;
+    if (credit.empty()) names += (names.empty() ? "" : " \xC2\xB7 ") + spec.name;
     else if (std::find(lines.begin(), lines.end(), credit) == lines.end()) lines.push_back(std::move(credit));
   }
   if (!names.empty()) lines.push_back(std::move(names));
@@ -141,14 +143,14 @@ void Panels::begin() {
 bool Panels::take_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
 bool Panels::take_keyboard() const { return ImGui::GetIO().WantCaptureKeyboard; }
 
-std::optional<Command> Panels::draw(const globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
+std::optional<Command> Panels::draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
                                     ViewerState& state) {
   frame_ms_[next_frame_] = static_cast<float>(stats.frame_ms);
   next_frame_ = (next_frame_ + 1) % kGraphFrames;
   std::optional<Command> command;
   toolbar(state, command);
   if (state.shown.statistics) statistics(globe, stats, state.shown.statistics);
-  if (state.shown.layers) layers(globe, state.view.time, state.shown.layers);
+  if (state.shown.layers) layers(globe, state, command);
   if (state.shown.settings) settings(state);
   if (state.shown.help) help(state.shown.help);
   if (state.shown.hints) hints(globe, state.shown.hints);

@@ -26,16 +26,16 @@ class Panels {
   bool take_mouse() const;
   bool take_keyboard() const;
 
-  /// Lays out the panels, draws them over the picture and changes `state` as the user asks.
+  /// Lays out the panels, draws them over the picture and changes `state` and the globe's layers as the user asks.
   /// Gives the command of a button that was pressed.
-  std::optional<Command> draw(const globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
+  std::optional<Command> draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
                               ViewerState& state);
 
  private:
   void toolbar(ViewerState& state, std::optional<Command>& command);
   void statistics(const globe::Globe& globe, const globe::FrameStats& stats, bool& shown);
   void loader(const globe::Globe& globe);
-  void layers(const globe::Globe& globe, const std::optional<UtcTime>& time, bool& shown);
+  void layers(globe::Globe& globe, ViewerState& state, std::optional<Command>& command);
   void settings(ViewerState& state);
   void help(bool& shown);
   void hints(const globe::Globe& globe, bool& shown);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,34 +44,72 @@ void catalogue_rows(const globe::CatalogueFacts& facts) {
   if (facts.rasters > 0) table_row("spacing", fmt::format("{:.4g} to {:.4g} m", facts.finest.value, facts.coarsest.value));
 }
 
-void layer_entry(const globe::LayerInfo& layer, const globe::SourceStats& stats, const std::string& step, const std::optional<globe::CatalogueFacts>& catalogue) {
-  const bool failed = !layer.error.empty() || stats.errors > 0;
-  if (failed) ImGui::PushStyleColor(ImGuiCol_Text, kErrorColour);
-  const std::string title =
-      fmt::format("{} ({}){}", layer.spec.name, globe::name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
-  const bool open = ImGui::CollapsingHeader(title.c_str(), ImGuiTreeNodeFlags_DefaultOpen);
-  if (failed) ImGui::PopStyleColor();
-  if (!open) return;
+/// Sliders for what may be changed of a layer. Whether something was.
+bool settings_rows(globe::LayerSettings& settings, globe::LayerGroup group) {
+  if (group == globe::LayerGroup::height) return ImGui::Checkbox("added to the heights below", &settings.adds);
+  const auto slider = [](const char* name, double& value, double least, double most, ImGuiSliderFlags flags = 0) {
+    return ImGui::SliderScalar(name, ImGuiDataType_Double, &value, &least, &most, "%.2f", flags | ImGuiSliderFlags_AlwaysClamp);
+  };
+  bool changed = slider("opacity", settings.opacity, 0.0, 1.0);
+  changed |= slider("gamma", settings.gamma, 0.1, 10.0, ImGuiSliderFlags_Logarithmic);
+  changed |= slider("multiplier", settings.multiplier, 0.0, 4.0);
+  return changed;
+}
+
+struct LayerState {
+  globe::SourceStats stats;
+  std::string step;
+  std::optional<globe::CatalogueFacts> catalogue;
+  std::shared_ptr<const source::RasterSource> raster;
+};
+
+void layer_details(const globe::LayerInfo& layer, const LayerState& state) {
   ImGui::PushTextWrapPos(0.0f);
-  const std::string place = layer.raster ? layer.raster->description().name : layer.spec.source.path.string();
+  const std::string place = state.raster ? state.raster->description().name : layer.spec.source.path.string();
   ImGui::TextWrapped("%s", place.c_str());
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingStretchProp)) {
-    if (!step.empty()) table_row("time", step);
-    if (layer.raster) raster_rows(layer.raster->description());
-    if (catalogue) catalogue_rows(*catalogue);
-    table_row("read", fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(stats.bytes)), stats.requests));
-    if (stats.errors > 0) table_row("errors", std::to_string(stats.errors));
+    if (!state.step.empty()) table_row("time", state.step);
+    if (state.raster) raster_rows(state.raster->description());
+    if (state.catalogue) catalogue_rows(*state.catalogue);
+    table_row("read", fmt::format("{} in {} requests", text_of_bytes(static_cast<double>(state.stats.bytes)), state.stats.requests));
+    if (state.stats.errors > 0) table_row("errors", std::to_string(state.stats.errors));
     ImGui::EndTable();
   }
   if (!layer.error.empty())
     ImGui::TextWrapped("%s", layer.error.c_str());
-  else if (!stats.last_error.empty())
-    ImGui::TextWrapped("%s", stats.last_error.c_str());
-  if (layer.raster) {
-    for (const std::string& hint : layer.raster->description().hints)
+  else if (!state.stats.last_error.empty())
+    ImGui::TextWrapped("%s", state.stats.last_error.c_str());
+  if (state.raster) {
+    for (const std::string& hint : state.raster->description().hints)
       ImGui::TextColored({1.0f, 0.80f, 0.40f, 1.0f}, "%s", hint.c_str());
   }
   ImGui::PopTextWrapPos();
+}
+
+/// A layer's switch, place and settings.
+void layer_entry(globe::Globe& globe, std::size_t i, const LayerState& state, bool may_rise, bool may_sink) {
+  const globe::LayerInfo& layer = globe.layers()[i];
+  globe::LayerSettings settings = globe.layer_settings(i);
+  bool changed = ImGui::Checkbox("##on", &settings.enabled);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("shown or not");
+  const auto arrow = [&](const char* name, ImGuiDir direction, bool can, bool up) {
+    ImGui::SameLine();
+    ImGui::BeginDisabled(!can);
+    if (ImGui::ArrowButton(name, direction)) globe.move_layer(i, up);
+    ImGui::EndDisabled();
+  };
+  arrow("##up", ImGuiDir_Up, may_rise, true);
+  arrow("##down", ImGuiDir_Down, may_sink, false);
+  ImGui::SameLine();
+  const bool failed = !layer.error.empty() || state.stats.errors > 0;
+  if (failed) ImGui::PushStyleColor(ImGuiCol_Text, kErrorColour);
+  const bool open = ImGui::CollapsingHeader(fmt::format("{} ({})", layer.spec.name, globe::name_of(layer.spec.group)).c_str(), ImGuiTreeNodeFlags_DefaultOpen);
+  if (failed) ImGui::PopStyleColor();
+  if (open) {
+    changed |= settings_rows(settings, layer.spec.group);
+    layer_details(layer, state);
+  }
+  if (changed) (void)globe.set_layer(i, settings);  // the sliders keep to the ranges
 }
 
 }  // namespace
@@ -147,17 +186,24 @@ void Panels::statistics(const globe::Globe& globe, const globe::FrameStats& s, b
   ImGui::End();
 }
 
-void Panels::layers(const globe::Globe& globe, const std::optional<UtcTime>& time, bool& shown) {
+/// The uppermost first.
+void Panels::layers(globe::Globe& globe, ViewerState& state, std::optional<Command>& command) {
   const ImVec2 display = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({10.0f, 52.0f}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSize({kLayersWidth, std::min(520.0f, display.y - 110.0f)}, ImGuiCond_FirstUseEver);
-  if (ImGui::Begin("Layers", &shown, ImGuiWindowFlags_NoCollapse)) {
+  if (ImGui::Begin("Layers", &state.shown.layers, ImGuiWindowFlags_NoCollapse)) {
     const auto stats = globe.source_stats();  // in the order of the layers
     ImGui::TextUnformatted(globe.world().planet.c_str());
+    ImGui::SameLine();
+    if (ImGui::SmallButton("Save")) command = Command::save_layers;
     if (!globe.world().file.empty()) ImGui::TextDisabled("%s", globe.world().file.string().c_str());
-    for (std::size_t i = 0; i < globe.layers().size(); ++i) {
+    const std::vector<std::size_t> order = globe.layer_order();
+    const auto same_group = [&](std::size_t a, std::size_t b) { return b < order.size() && globe.layers()[order[a]].spec.group == globe.layers()[order[b]].spec.group; };
+    for (std::size_t n = order.size(); n-- > 0;) {
+      const std::size_t i = order[n];
       ImGui::PushID(static_cast<int>(i));
-      layer_entry(globe.layers()[i], stats[i], globe.step_of(i, time), globe::catalogue_facts(globe, i));
+      const LayerState now{stats[i], globe.step_of(i, state.view.time), globe::catalogue_facts(globe, i), raster_of(globe, i)};
+      layer_entry(globe, i, now, same_group(n, n + 1), n > 0 && same_group(n, n - 1));
       ImGui::PopID();
     }
   }

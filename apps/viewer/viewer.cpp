@@ -278,6 +278,9 @@ void Viewer::obey(Command command, double now) {
     case Command::settings:
       flip(shown.settings);
       break;
+    case Command::save_layers:
+      save_layers();
+      break;
     case Command::wireframe:
       flip(view.wireframe);
       break;
@@ -343,6 +346,12 @@ void Viewer::save_screenshot() {
   const auto written = globe::write_png(file, view_->picture(navigation_->camera(), state_.view));
   say(written ? fmt::format("saved {}", file.string()) : written.error().message);
   if (!written) report(written.error());
+}
+
+void Viewer::save_layers() {
+  const auto file = globe::save_layers(*globe_, {});
+  say(file ? fmt::format("layers saved in {}", file->string()) : file.error().message);
+  if (!file) report(file.error());
 }
 
 void Viewer::say(const std::string& text) {

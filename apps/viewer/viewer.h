@@ -43,6 +43,7 @@ class Viewer {
   void toggle_recording(double now);
   void toggle_replay(double now);
   void save_screenshot();
+  void save_layers();
   void say(const std::string& text);
 
   /// Whether there is something new to show.

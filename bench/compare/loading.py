@@ -7,6 +7,7 @@ The tile server is that of run.py. Nothing else should run meanwhile. Writes loa
 
 - teleports: seconds until a view is complete from an empty cache and from a warm disk cache, and the time that the network
   alone would take (each request one delay, as many at a time as there are connections; loopback has bandwidth in plenty);
+- how many of the files fetched for a teleport the finished picture rests on;
 - a flight over the ground at 250 m/s by the wall clock: the share of the bytes that the same flight with every frame finished
   does not fetch, which is what was loaded and never drawn;
 - frames while a view loads, by delay and at 2 Mbit/s: the worst as a multiple of the median.
@@ -16,6 +17,8 @@ import csv
 import json
 import math
 import pathlib
+import random
+import shutil
 import socket
 import sqlite3
 import statistics
@@ -32,6 +35,7 @@ DELAY_MS = 20
 SPEED, FLIGHT_S = 250.0, 60
 METRES_A_DEGREE = 111_320
 STANDS_S = 12
+SAMPLED_FILES = 40
 LINE_BITS_PER_SECOND = 2_000_000
 
 
@@ -108,6 +112,47 @@ def teleport(server, pose, options):
         return figures
 
 
+def final_set(server, pose, options):
+    """How many of the files that a cold view fetches its finished picture rests on: those without which, offline, it is another picture. Tried for
+    each zoom as a whole, then for a sample of the files of the zooms that matter."""
+    with tempfile.TemporaryDirectory(prefix="tellurion-loading-") as name:
+        folder = pathlib.Path(name)
+        world = run.world_file(folder, server)
+
+        def picture(place, *more):
+            out = place / "p.png"
+            run.run_tellurion([options.tellurion, "render", world, "--camera", pose.text(), "--out", out, *more, *run.common_options(1, place)], options)
+            return out.read_bytes()
+
+        def without(keys):
+            place = folder / "less"
+            shutil.rmtree(place, ignore_errors=True)
+            shutil.copytree(folder / "cache", place / "cache")
+            with contextlib.closing(sqlite3.connect(place / "cache" / "files.sqlite")) as database, database:
+                database.executemany("DELETE FROM files WHERE key = ?", [(key,) for key in keys])
+            return picture(place, "--offline", "--timeout", 20)
+
+        picture(folder)
+        files = [key for key in kept_files(folder / "cache") if "/imagery/" in key or "/terrain/" in key]
+        whole = without([])
+        groups = {}
+        for key in files:
+            groups.setdefault(tuple(key.split("/")[-4:-2]), []).append(key)
+        needed = [key for group in groups.values() if without(group) != whole for key in group]
+        sample = random.Random(1).sample(needed, min(len(needed), SAMPLED_FILES))
+        share = sum(without([key]) != whole for key in sample) / len(sample)
+        return {"files": len(files), "of_zooms_needed": len(needed), "sampled": len(sample), "share_needed": share, "ratio": len(files) / (share * len(needed))}
+
+
+def final_sets(options):
+    with run.TileServer(options.tile_server, options.cache, 0) as server:
+        found = {}
+        for name, pose in {"plain": PLAIN, "peak": PEAK, "slope": SLOPE}.items():
+            found[name] = final_set(server, pose, options)
+            print(f"final set, {name}: {found[name]}", file=sys.stderr, flush=True)
+        return found
+
+
 def teleports(options):
     found = {}
     with run.TileServer(options.tile_server, options.cache, DELAY_MS) as server:
@@ -166,6 +211,8 @@ def report(figures):
     lines = [figures["machine"], "", "| teleport | requests | MB | cold s | warm s | network s | ratio | warm requests |", "|---|---|---|---|---|---|---|---|"]
     lines += [f"| {name} | {f['cold_requests']:.0f} | {f['cold_bytes'] / 1e6:.2f} | {f['cold_s']:.2f} | {f['warm_s']:.2f} | {f['network_s']:.2f} | {f['ratio']:.2f} | {f['warm_requests']:.0f} |"
               for name, f in figures["teleports"].items()]
+    lines += ["", "| final set | files fetched | of zooms that matter | of a sample of them needed | ratio |", "|---|---|---|---|---|"]
+    lines += [f"| {name} | {f['files']} | {f['of_zooms_needed']} | {f['share_needed']:.1%} of {f['sampled']} | {f['ratio']:.2f} |" for name, f in figures["final_sets"].items()]
     flight = figures["flight"]
     lines += ["", f"Flight at {SPEED:.0f} m/s for {FLIGHT_S} s: {flight['files']} files, {flight['bytes'] / 1e6:.2f} MB; {flight['files_in_vain']} files and "
               f"{flight['share_in_vain']:.1%} of the bytes are not among the {flight['finished_files']} files of the finished flight."]
@@ -176,7 +223,7 @@ def report(figures):
 
 def main():
     options = run.parse_options(__doc__, browsers=False)
-    figures = {"machine": run.machine([]), "teleports": teleports(options), "flight": flight_in_vain(options), "frames": frames_while_loading(options)}
+    figures = {"machine": run.machine([]), "teleports": teleports(options), "final_sets": final_sets(options), "flight": flight_in_vain(options), "frames": frames_while_loading(options)}
     (options.out / "loading.json").write_text(json.dumps(figures, indent=1) + "\n")
     (options.out / "loading.md").write_text(report(figures))
     print(report(figures), end="")

@@ -164,9 +164,12 @@ struct Globe::State {
   std::shared_ptr<const surface::SurfaceFacts> facts;
   std::vector<std::pair<std::shared_ptr<const surface::SurfaceDescription>, std::shared_ptr<const surface::SurfaceFacts>>> other_facts;  ///< of other times
   std::vector<SourceStats> sources;
+  std::vector<bool> opened;            ///< of each layer: has been opened, or tried
+  int opening = 0;                     ///< layers that workers open
+  std::uint64_t tables_revision = 0;   ///< of the surface that the tables are of
+  std::shared_ptr<HeightTables> tables;
 
   std::vector<std::unique_ptr<SurfaceWorker>> workers;
-  std::unique_ptr<HeightTables> tables;
   std::unique_ptr<WorkerPool> pool;  ///< last: its threads end before what they use
 
   std::shared_ptr<fetch::ByteStore> needed_store();
@@ -174,7 +177,10 @@ struct Globe::State {
   Result<std::unique_ptr<LayerCatalogue>> open_catalogue(const LayerSpec& spec, std::size_t layer);
   void show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
   void open_layers();
-  void take_table(std::shared_ptr<const surface::ErrorTable> found);
+  void open_later(std::size_t layer);
+  void show_changed(bool heights);
+  std::shared_ptr<HeightTables> begin_heights();
+  std::shared_ptr<HeightTables> current_tables();
 };
 
 /// The store of bytes, made for the first layer that needs it.
@@ -231,11 +237,69 @@ Result<std::unique_ptr<LayerCatalogue>> Globe::State::open_catalogue(const Layer
 
 void Globe::State::show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
   steps->set_catalogue(layer, std::move(catalogue));
+  show_changed(false);
+}
+
+/// What the layers are now is shown. `heights`: others have error tables.
+void Globe::State::show_changed(bool heights) {
   auto changed = steps->at(options.time);
+  {
+    std::lock_guard lock(mutex);
+    if (changed == surface) return;
+    surface = std::move(changed);
+    if (heights) table = nullptr;
+    facts = surface::make_facts(surface, table);
+    other_facts.clear();
+  }
+  if (heights) begin_heights()->begin_scan();
+}
+
+/// Error tables for the heights as they are now.
+std::shared_ptr<HeightTables> Globe::State::begin_heights() {
+  std::shared_ptr<HeightTables> begun;
+  {
+    std::lock_guard lock(mutex);
+    const std::uint64_t revision = surface->revision;
+    begun = tables = std::make_shared<HeightTables>(surface, blocks, options.cache_folder, *pool, [this, revision](std::shared_ptr<const surface::ErrorTable> found) {
+      std::lock_guard guard(mutex);
+      if (revision != tables_revision) return;  // heights have changed since
+      table = std::move(found);
+      facts = surface::make_facts(surface, table);
+      other_facts.clear();
+    });
+    tables_revision = revision;
+  }
+  begun->load(options.scan_heights);
+  return begun;
+}
+
+std::shared_ptr<HeightTables> Globe::State::current_tables() {
   std::lock_guard lock(mutex);
-  surface = std::move(changed);
-  facts = surface::make_facts(surface, table);
-  other_facts.clear();
+  return tables;
+}
+
+/// Has a worker open a layer that was off.
+void Globe::State::open_later(std::size_t layer) {
+  {
+    std::lock_guard lock(mutex);
+    if (opened[layer]) return;
+    opened[layer] = true;
+    ++opening;
+  }
+  pool->submit_background([this, layer](int) {
+    const LayerSpec& spec = world.layers[layer];
+    auto source = spec.source.raster ? Result<std::unique_ptr<source::RasterSource>>(nullptr) : open_source(spec);
+    if (source) {
+      steps->set_source(layer, spec.source.raster ? spec.source.raster : std::shared_ptr<const source::RasterSource>(std::move(*source)));
+      show_changed(spec.group == LayerGroup::height);
+    }
+    std::lock_guard lock(mutex);
+    if (!source) {
+      ++sources[layer].errors;
+      sources[layer].last_error = source.error().message;
+    }
+    --opening;
+  });
 }
 
 void Globe::State::open_layers() {
@@ -250,13 +314,14 @@ void Globe::State::open_layers() {
       stats.last_error = info.error = place + error.message;
     };
     catalogues.emplace_back();
+    opened.push_back(spec.enabled || spec.source.type == "catalogue" || spec.source.time);
     if (spec.enabled && spec.source.raster) {
       info.raster = spec.source.raster;
-    } else if (spec.enabled && spec.source.type == "catalogue") {
+    } else if (spec.source.type == "catalogue") {
       if (auto catalogue = open_catalogue(spec, layers.size())) {
         catalogues.back() = std::move(*catalogue);
         info.catalogue = catalogues.back()->current();
-      } else {
+      } else if (spec.enabled) {
         fail(catalogue.error());
       }
     } else if (spec.enabled && !spec.source.time) {
@@ -275,13 +340,6 @@ void Globe::State::open_layers() {
   for (std::size_t i = 0; i < layers.size(); ++i) layers[i].raster = steps->raster_at(i, options.time);
 }
 
-void Globe::State::take_table(std::shared_ptr<const surface::ErrorTable> found) {
-  std::lock_guard lock(mutex);
-  table = std::move(found);
-  facts = surface::make_facts(surface, table);
-  other_facts.clear();
-}
-
 Globe::Globe(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Globe::~Globe() = default;
 
@@ -294,11 +352,9 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
   State& s = *globe->state_;
   for (int i = 0; i < std::max(threads, 1); ++i) s.workers.push_back(std::make_unique<SurfaceWorker>(s.blocks));
   s.pool = std::make_unique<WorkerPool>(threads, kWaitingJobs);
-  s.tables = std::make_unique<HeightTables>(s.surface, s.blocks, options.cache_folder, *s.pool,
-                                            [&s](std::shared_ptr<const surface::ErrorTable> table) { s.take_table(std::move(table)); });
-  s.tables->load(options.scan_heights);
-  for (const auto& catalogue : s.catalogues) {
-    if (catalogue) catalogue->begin();
+  s.begin_heights();
+  for (std::size_t i = 0; i < s.catalogues.size(); ++i) {
+    if (s.catalogues[i] && s.world.layers[i].enabled) s.catalogues[i]->begin();
   }
   return globe;
 }
@@ -333,7 +389,11 @@ std::vector<std::string> Globe::problems() const {
 }
 
 std::vector<SourceStats> Globe::source_stats() const {
-  std::vector<SourceStats> all = state_->sources;
+  std::vector<SourceStats> all;
+  {
+    std::lock_guard lock(state_->mutex);
+    all = state_->sources;
+  }
   for (std::size_t layer = 0; layer < all.size(); ++layer) {
     for (const std::uint32_t id : state_->steps->source_ids(layer)) {
       cache::SourceReads reads = state_->blocks.reads_of(id);
@@ -357,8 +417,13 @@ std::vector<SourceStats> Globe::source_stats() const {
 }
 
 bool Globe::data_missing() const {
+  const auto cannot_be_opened = [&](std::size_t layer) {
+    std::lock_guard lock(state_->mutex);
+    return state_->sources[layer].errors > 0;
+  };
   for (std::size_t layer = 0; layer < state_->layers.size(); ++layer) {
-    if (!state_->layers[layer].error.empty() || state_->steps->failures_of(layer).count > 0) return true;
+    if (!layer_settings(layer).enabled) continue;
+    if (cannot_be_opened(layer) || state_->steps->failures_of(layer).count > 0) return true;
     const auto& catalogue = state_->catalogues[layer];
     if (catalogue && (catalogue->problems().count > 0 || catalogue->current()->open_sets()->failures().count > 0)) return true;
     for (const std::uint32_t id : state_->steps->source_ids(layer)) {
@@ -464,12 +529,46 @@ std::size_t Globe::rasters_to_look_into(std::size_t layer) const {
 }
 
 bool Globe::catalogues_ready() const {
-  return std::ranges::all_of(state_->catalogues, [](const auto& catalogue) { return !catalogue || catalogue->unexamined() == 0; });
+  {
+    std::lock_guard lock(state_->mutex);
+    if (state_->opening > 0) return false;
+  }
+  for (std::size_t i = 0; i < state_->catalogues.size(); ++i) {
+    const auto& catalogue = state_->catalogues[i];
+    if (catalogue && catalogue->unexamined() > 0 && layer_settings(i).enabled) return false;
+  }
+  return true;
 }
 
-bool Globe::tables_ready() const { return state_->tables->ready(); }
+LayerSettings Globe::layer_settings(std::size_t layer) const { return state_->steps->settings(layer); }
+std::vector<std::size_t> Globe::layer_order() const { return state_->steps->order(); }
 
-void Globe::begin_tables() { state_->tables->begin_scan(); }
+Result<void> Globe::set_layer(std::size_t layer, const LayerSettings& settings) {
+  State& s = *state_;
+  if (layer >= s.layers.size()) return {ErrorCode::invalid_argument, fmt::format("there is no layer {}: the world has {}", layer, s.layers.size())};
+  const LayerSpec& spec = s.world.layers[layer];
+  if (Result<void> fine = check(settings, spec.group); !fine) return {ErrorCode::invalid_argument, fmt::format("layer \"{}\": {}", spec.name, fine.error().message)};
+  const LayerSettings before = s.steps->settings(layer);
+  if (settings == before) return {};
+  s.steps->set_settings(layer, settings);
+  const bool heights = spec.group == LayerGroup::height && (settings.enabled || before.enabled);
+  if (settings.enabled && !before.enabled) {
+    s.open_later(layer);
+    if (s.catalogues[layer]) s.catalogues[layer]->begin();
+  }
+  s.show_changed(heights);
+  return {};
+}
+
+bool Globe::move_layer(std::size_t layer, bool up) {
+  if (layer >= state_->layers.size() || !state_->steps->move(layer, up)) return false;
+  state_->show_changed(state_->world.layers[layer].group == LayerGroup::height);
+  return true;
+}
+
+bool Globe::tables_ready() const { return state_->current_tables()->ready(); }
+
+void Globe::begin_tables() { state_->current_tables()->begin_scan(); }
 
 bool Globe::wait_for_tables(std::chrono::steady_clock::time_point deadline) {
   begin_tables();

@@ -110,6 +110,16 @@ class Globe {
   fetch::FetchStats fetch_stats() const;
   std::size_t memory_budget_bytes() const;
 
+  /// What may be changed of a layer as it is now. Changes show at once, where tiles have been made anew with them.
+  LayerSettings layer_settings(std::size_t layer) const;
+  /// One that was off when the world was opened is opened by a worker; until then it shows nothing; if it fails, source_stats tells why.
+  /// Errors: invalid_argument (no such layer, a value out of its range, adding what are no heights).
+  Result<void> set_layer(std::size_t layer, const LayerSettings& settings);
+  /// The layer lies over (`up`), or under, the next one of its group. False if there is none.
+  bool move_layer(std::size_t layer, bool up);
+  /// All layers, the lowest first.
+  std::vector<std::size_t> layer_order() const;
+
   /// Puts rasters (paths or URLs) into a layer of type "catalogue", in the place of those of the same path; or takes some out. Both return at
   /// once; files are looked into by workers, and only the tiles that they touch are made anew. Kept while the globe is open.
   /// Errors: invalid_argument (no such layer, or none of that type).
@@ -119,7 +129,7 @@ class Globe {
   std::shared_ptr<const source::Catalogue> catalogue_of(std::size_t layer) const;
   /// How many rasters of it have not been looked into.
   std::size_t rasters_to_look_into(std::size_t layer) const;
-  /// Whether all rasters of catalogues have been looked into.
+  /// Whether all rasters of catalogues have been looked into, and layers that were switched on are open.
   bool catalogues_ready() const;
   /// Waits for that (without threads: looks into them here). False if `deadline` came first.
   bool wait_for_catalogues(std::chrono::steady_clock::time_point deadline);

@@ -173,7 +173,7 @@ std::shared_ptr<const source::Catalogue> LayerCatalogue::current() const {
 void LayerCatalogue::begin() {
   {
     std::lock_guard lock(state_->mutex);
-    state_->begun = true;
+    if (std::exchange(state_->begun, true)) return;
   }
   if (unexamined_ > 0) state_->setting.look_into_more();
 }

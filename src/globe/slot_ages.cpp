@@ -10,11 +10,30 @@ constexpr std::uint64_t kFramesWanted = 3;  ///< a slot out of sight for longer 
 
 using Layers = std::vector<surface::Layer>;
 
+bool shows_the_same(const surface::Layer& a, const surface::Layer& b) {
+  return a.source_id == b.source_id && a.source == b.source && !a.catalogue == !b.catalogue && a.opacity == b.opacity && a.gamma == b.gamma &&
+         a.multiplier == b.multiplier && a.adds == b.adds;
+}
+
 /// Where `some` show what `others` do not; both outlive the answer.
 void add_differing(const Layers& some, const Layers& others, std::vector<const source::Coverage*>& found) {
   for (const surface::Layer& layer : some) {
-    const auto same = [&](const surface::Layer& other) { return other.source_id == layer.source_id && other.source == layer.source && !other.catalogue == !layer.catalogue; };
-    if (std::ranges::none_of(others, same)) found.push_back(&surface::coverage_of(layer));
+    if (std::ranges::none_of(others, [&](const surface::Layer& other) { return shows_the_same(layer, other); })) found.push_back(&surface::coverage_of(layer));
+  }
+}
+
+/// Where layers that both have lie in another order.
+void add_reordered(const Layers& before, const Layers& now, std::vector<const source::Coverage*>& found) {
+  const auto common = [](const Layers& some, const Layers& others) {
+    std::vector<const surface::Layer*> layers;
+    for (const surface::Layer& layer : some) {
+      if (std::ranges::find(others, layer.source_id, &surface::Layer::source_id) != others.end()) layers.push_back(&layer);
+    }
+    return layers;
+  };
+  const auto old_ones = common(before, now), new_ones = common(now, before);
+  for (std::size_t i = 0; i < std::min(old_ones.size(), new_ones.size()); ++i) {
+    if (old_ones[i]->source_id != new_ones[i]->source_id) found.push_back(&surface::coverage_of(*new_ones[i]));
   }
 }
 
@@ -50,6 +69,7 @@ void SlotAges::layers_changed(const surface::SurfaceDescription& before, const s
   std::vector<const source::Coverage*> changed;
   add_differing(old_layers, new_layers, changed);
   add_differing(new_layers, old_layers, changed);
+  add_reordered(old_layers, new_layers, changed);
   const source::Catalogue::Sets sets = changed_sets(old_layers, new_layers);
   for (const auto& set : sets) changed.push_back(&set->footprint);
   for (auto& [key, slot] : slots_) {

@@ -37,8 +37,8 @@ surface::ImageUse use_of(LayerGroup group) {
 SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open)
     : ellipsoid_(ellipsoid), open_(std::move(open)), next_id_(static_cast<std::uint32_t>(layers.size())) {
   for (const LayerInfo& info : layers) {
-    OneLayer layer{info.spec, info.raster, {}, info.catalogue};
-    if (info.spec.source.time && info.spec.enabled) {
+    OneLayer layer{info.spec, {}, info.raster, info.catalogue, info.spec};
+    if (info.spec.source.time) {
       if (auto times = source::TimeSteps::create(*info.spec.source.time)) layer.timed = TimedLayer{std::move(*times), {}, {}, {}};
       has_times_ = has_times_ || layer.timed.has_value();
     }
@@ -101,7 +101,9 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
   Steps steps;
   find_steps(time, steps);
   std::vector<Source> sources;
-  for (std::size_t i = 0; i < layers_.size(); ++i) sources.push_back(layers_[i].timed ? source_of(layers_[i], steps[i]) : layers_[i].fixed);
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    sources.push_back(layers_[i].timed && settings(i).enabled ? source_of(layers_[i], steps[i]) : nullptr);
+  }
   std::lock_guard lock(mutex_);
   if (auto same = held(steps)) return same;
   auto description = describe(steps, sources);
@@ -110,48 +112,96 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
   return description;
 }
 
-/// With the lock held.
+/// With the lock held. `sources` are those of layers with times.
 std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::describe(const Steps& steps, const std::vector<Source>& sources) {
   auto description = std::make_shared<surface::SurfaceDescription>();
   description->ellipsoid = ellipsoid_;
   description->revision = ++last_revision_;
   for (const std::size_t i : order_) {
     const OneLayer& one = layers_[i];
-    if (!sources[i] && !one.catalogue) continue;
+    const Source& source = one.timed ? sources[i] : one.fixed;
+    if (!one.settings.enabled || (!source && !one.catalogue)) continue;
     surface::Layer layer;
-    layer.source = sources[i];
+    layer.source = source;
     layer.catalogue = one.catalogue;
     layer.name = one.spec.name;
     layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : static_cast<std::uint32_t>(i);
-    layer.opacity = static_cast<float>(one.spec.opacity);
-    layer.gamma = static_cast<float>(one.spec.gamma);
-    layer.multiplier = static_cast<float>(one.spec.multiplier);
-    layer.adds = one.spec.adds;
+    layer.opacity = static_cast<float>(one.settings.opacity);
+    layer.gamma = static_cast<float>(one.settings.gamma);
+    layer.multiplier = static_cast<float>(one.settings.multiplier);
+    layer.adds = one.settings.adds;
     layer.use = use_of(one.spec.group);
     (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));
   }
   return description;
 }
 
+/// With the lock held. Frames ask for what is held: they must find it without opening anything. Held surfaces whose steps are not open any
+/// more are forgotten.
+void SurfaceSteps::describe_anew() {
+  for (auto held = surfaces_.begin(); held != surfaces_.end();) {
+    std::vector<Source> sources(layers_.size());
+    bool open = true;
+    for (std::size_t i = 0; i < layers_.size() && open; ++i) {
+      const OneLayer& layer = layers_[i];
+      if (!layer.timed || !layer.settings.enabled) continue;
+      const auto found = std::ranges::find(layer.timed->open, held->first[i], [](const auto& entry) { return entry.first; });
+      open = found != layer.timed->open.end();
+      if (open) sources[i] = found->second;
+    }
+    if (open) {
+      held->second = describe(held->first, sources);
+      ++held;
+    } else {
+      held = surfaces_.erase(held);
+    }
+  }
+}
+
 void SurfaceSteps::set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
   std::lock_guard lock(mutex_);
   layers_[layer].catalogue = std::move(catalogue);
-  // Frames ask for these: they must find them without opening anything.
-  for (auto& [steps, description] : surfaces_) {
-    auto changed = std::make_shared<surface::SurfaceDescription>(*description);
-    changed->revision = ++last_revision_;
-    for (auto* group : {&changed->heights, &changed->colours}) {
-      for (surface::Layer& one : *group) {
-        if (one.source_id == layer && one.catalogue) one.catalogue = layers_[layer].catalogue;
-      }
-    }
-    description = std::move(changed);
-  }
+  describe_anew();
+}
+
+void SurfaceSteps::set_source(std::size_t layer, std::shared_ptr<const source::RasterSource> source) {
+  std::lock_guard lock(mutex_);
+  layers_[layer].fixed = std::move(source);
+  describe_anew();
+}
+
+void SurfaceSteps::set_settings(std::size_t layer, const LayerSettings& settings) {
+  std::lock_guard lock(mutex_);
+  layers_[layer].settings = settings;
+  describe_anew();
+}
+
+bool SurfaceSteps::move(std::size_t layer, bool up) {
+  std::lock_guard lock(mutex_);
+  const auto here = std::ranges::find(order_, layer);
+  if (up ? std::next(here) == order_.end() : here == order_.begin()) return false;
+  const auto other = up ? std::next(here) : std::prev(here);
+  if (layers_[*other].spec.group != layers_[layer].spec.group) return false;
+  std::swap(*here, *other);
+  describe_anew();
+  return true;
+}
+
+LayerSettings SurfaceSteps::settings(std::size_t layer) const {
+  std::lock_guard lock(mutex_);
+  return layers_[layer].settings;
+}
+
+std::vector<std::size_t> SurfaceSteps::order() const {
+  std::lock_guard lock(mutex_);
+  return order_;
 }
 
 std::shared_ptr<const source::RasterSource> SurfaceSteps::raster_at(std::size_t layer, const std::optional<UtcTime>& time) {
   OneLayer& one = layers_[layer];
-  return one.timed ? source_of(one, one.timed->times.step_at(time)) : one.fixed;
+  if (one.timed) return settings(layer).enabled ? source_of(one, one.timed->times.step_at(time)) : nullptr;
+  std::lock_guard lock(mutex_);
+  return one.fixed;
 }
 
 std::string SurfaceSteps::text_of(std::size_t layer, const std::optional<UtcTime>& time) const {

@@ -35,8 +35,19 @@ class SurfaceSteps {
   /// The same, but opens nothing: null if it is not among the last few.
   std::shared_ptr<const surface::SurfaceDescription> held_at(const std::optional<UtcTime>& time);
 
-  /// A layer shows another catalogue from now on.
+  // From now on. What is held is described anew, without opening anything.
+
+  /// A layer shows another catalogue.
   void set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
+  /// A layer without times that had no source has one.
+  void set_source(std::size_t layer, std::shared_ptr<const source::RasterSource> source);
+  void set_settings(std::size_t layer, const LayerSettings& settings);
+  /// A layer lies over (`up`), or under, the next one of its group. False if there is none.
+  bool move(std::size_t layer, bool up);
+
+  LayerSettings settings(std::size_t layer) const;
+  /// All layers, the lowest first.
+  std::vector<std::size_t> order() const;
 
   /// A layer's source at `time`; null: it has none.
   std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time);
@@ -63,10 +74,12 @@ class SurfaceSteps {
     Failures failures;
   };
   struct OneLayer {
-    LayerSpec spec;
-    Source fixed;                     ///< null: it has times, or nothing is drawn of it
+    LayerSpec spec;                   ///< as the world was opened
     std::optional<TimedLayer> timed;
-    std::shared_ptr<const source::Catalogue> catalogue;  ///< guarded by mutex_, unlike what is above
+    // Guarded by mutex_:
+    Source fixed;                     ///< null: it has times, or has not been opened
+    std::shared_ptr<const source::Catalogue> catalogue;
+    LayerSettings settings;
   };
   using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
 
@@ -75,14 +88,15 @@ class SurfaceSteps {
   Source source_of(OneLayer& layer, std::int64_t step);
   std::shared_ptr<const surface::SurfaceDescription> held(const Steps& steps);
   std::shared_ptr<const surface::SurfaceDescription> describe(const Steps& steps, const std::vector<Source>& sources);
+  void describe_anew();
 
   geo::Ellipsoid ellipsoid_;
   OpenSource open_;
   std::vector<OneLayer> layers_;
-  std::vector<std::size_t> order_;  ///< in which they are drawn
   bool has_times_ = false;          ///< some layer has
 
   mutable std::mutex mutex_;        ///< guards what follows and what the timed layers have open; never held while a source is opened
+  std::vector<std::size_t> order_;  ///< in which layers are drawn
   std::uint32_t next_id_ = 0;
   std::uint64_t last_revision_ = 0;
   Steps asked_steps_;               ///< of the last question: frames ask, and must not allocate

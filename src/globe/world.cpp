@@ -88,8 +88,8 @@ class WorldReader {
       fail(*table.get("group"), fmt::format("no group is called \"{}\": it is one of {}", *group, fmt::join(kGroupNames, ", ")));
     }
     layer.opacity = number(table, "opacity", 0.0, 1.0).value_or(1.0);
-    layer.gamma = number(table, "gamma", 0.01, 100.0).value_or(1.0);
-    layer.multiplier = number(table, "multiplier", -1e6, 1e6).value_or(1.0);
+    layer.gamma = number(table, "gamma", kLeastGamma, kMostGamma).value_or(1.0);
+    layer.multiplier = number(table, "multiplier", -kMostMultiplier, kMostMultiplier).value_or(1.0);
     layer.enabled = flag(table, "enabled").value_or(true);
     layer.attribution = text(table, "attribution").value_or("");
     if (const auto mode = text(table, "mode")) {
@@ -418,6 +418,18 @@ Result<World> parse_world(std::string_view text, const std::filesystem::path& fo
     return Error{ErrorCode::corrupt,
                  fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description())};
   }
+}
+
+Result<void> check(const LayerSettings& settings, LayerGroup group) {
+  const auto out_of_range = [](const char* key, double value, double least, double most) -> Result<void> {
+    if (value >= least && value <= most) return {};
+    return {ErrorCode::invalid_argument, fmt::format("`{}` is {} to {}, not {}", key, least, most, value)};
+  };
+  if (auto fine = out_of_range("opacity", settings.opacity, 0.0, 1.0); !fine) return fine;
+  if (auto fine = out_of_range("gamma", settings.gamma, kLeastGamma, kMostGamma); !fine) return fine;
+  if (auto fine = out_of_range("multiplier", settings.multiplier, -kMostMultiplier, kMostMultiplier); !fine) return fine;
+  if (settings.adds && group != LayerGroup::height) return {ErrorCode::invalid_argument, "only heights are added to those below"};
+  return {};
 }
 
 Result<World> load_world(const std::filesystem::path& file) {

@@ -87,16 +87,27 @@ struct SourceSpec {
 /// The path, or the URL without what is secret in it; empty if there is neither.
 std::string data_name(const SourceSpec& source);
 
-struct LayerSpec {
+inline constexpr double kLeastGamma = 0.01, kMostGamma = 100.0, kMostMultiplier = 1e6;
+
+/// What of a layer may be changed while its world is open.
+struct LayerSettings {
+  double opacity = 1.0;     ///< 0 to 1
+  double gamma = 1.0;       ///< kLeastGamma to kMostGamma
+  double multiplier = 1.0;  ///< within +-kMostMultiplier
+  bool enabled = true;
+  bool adds = false;        ///< height layers: added to the ones below instead of replacing them
+
+  friend bool operator==(const LayerSettings&, const LayerSettings&) = default;
+};
+
+/// Errors: invalid_argument, naming the value that is out of its range.
+Result<void> check(const LayerSettings& settings, LayerGroup group);
+
+struct LayerSpec : LayerSettings {
   std::string name;
   LayerGroup group = LayerGroup::color;
   SourceSpec source;
-  double opacity = 1.0;
-  double gamma = 1.0;
-  double multiplier = 1.0;
-  bool enabled = true;
   std::string attribution;  ///< whom to credit; empty: whom the source itself names
-  bool adds = false;   ///< height layers: added to the ones below instead of replacing them
   int line = 0;        ///< where it stands in the world file; 0 if it does not
 };
 

@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include "globe/globe.h"
 #include "globe/world_text.h"
 
 namespace tellurion::globe {
@@ -98,9 +99,9 @@ Result<void> WorldText::add_layer(const LayerSpec& layer) {
   return take(text + with_line_ends_of(text, to_toml(layer, folder_)), expected);
 }
 
-Result<void> WorldText::remove_layer(std::size_t layer) {
+/// Where a layer and the comment lines right above it begin and end.
+std::pair<std::size_t, std::size_t> WorldText::lines_of(std::size_t layer) const {
   const toml::table root = toml::parse(text_);
-  if (are_inline(root)) return inline_layers(name_);
   const toml::array& layers = *root["layer"].as_array();
   const std::size_t header = line_start(text_, begin_of(text_, layers[layer]));
   std::size_t end = text_.size();
@@ -110,10 +111,69 @@ Result<void> WorldText::remove_layer(std::size_t layer) {
   };
   for (const toml::node& other : layers) ends_before(other);
   if (const toml::node* planet = root.get("planet")) ends_before(*planet);
+  return {comments_above(text_, header), end};
+}
+
+Result<void> WorldText::remove_layer(std::size_t layer) {
+  if (are_inline(toml::parse(text_))) return inline_layers(name_);
   World expected = world_;
   expected.layers.erase(expected.layers.begin() + static_cast<std::ptrdiff_t>(layer));
-  const std::size_t start = comments_above(text_, header);
+  const auto [start, end] = lines_of(layer);
   return take(text_.substr(0, start) + text_.substr(end), expected);
+}
+
+Result<void> WorldText::move_behind(std::size_t layer, std::size_t other) {
+  if (are_inline(toml::parse(text_))) return inline_layers(name_);
+  if (layer == other) return {};
+  World expected = world_;
+  LayerSpec moved = expected.layers[layer];
+  expected.layers.insert(expected.layers.begin() + static_cast<std::ptrdiff_t>(other) + 1, std::move(moved));
+  expected.layers.erase(expected.layers.begin() + static_cast<std::ptrdiff_t>(layer < other ? layer : layer + 1));
+
+  const auto [start, end] = lines_of(layer);
+  const std::size_t place = lines_of(other).second;
+  std::string lines = text_.substr(start, end - start);
+  if (lines.back() != '\n') lines += with_line_ends_of(text_, "\n");  // it was the last one
+  std::string text = text_;
+  if (place > start) {
+    if (text.back() != '\n' && place == text.size()) lines.insert(0, with_line_ends_of(text_, "\n"));
+    text.insert(place, lines).erase(start, end - start);
+  } else {
+    text.erase(start, end - start).insert(place, lines);
+  }
+  return take(std::move(text), expected);
+}
+
+Result<void> WorldText::set_settings(std::size_t layer, const LayerSettings& settings) {
+  World expected = world_;
+  LayerSettings& now = expected.layers[layer];
+  const auto change = [&](std::string& text, const char* key, const std::string& value) {
+    const toml::table root = toml::parse(text);
+    const toml::table& table = *root["layer"][layer].as_table();
+    if (const toml::node* node = table.get(key)) {
+      const std::size_t start = begin_of(text, *node);
+      text.replace(start, end_of(text, *node) - start, value);
+      return;
+    }
+    const std::size_t header = begin_of(text, table);
+    const std::string end = with_line_ends_of(text, "\n");
+    std::size_t line_end = text.find('\n', header);
+    if (line_end == std::string::npos) {
+      text += end;
+      line_end = text.size() - 1;
+    }
+    text.insert(line_end + 1, fmt::format("{} = {}{}", key, value, end));
+  };
+  if (settings == now) return {};
+  if (are_inline(toml::parse(text_))) return inline_layers(name_);
+  std::string text = text_;
+  if (settings.opacity != now.opacity) change(text, "opacity", to_toml(settings.opacity));
+  if (settings.gamma != now.gamma) change(text, "gamma", to_toml(settings.gamma));
+  if (settings.multiplier != now.multiplier) change(text, "multiplier", to_toml(settings.multiplier));
+  if (settings.enabled != now.enabled) change(text, "enabled", settings.enabled ? "true" : "false");
+  if (settings.adds != now.adds) change(text, "mode", settings.adds ? "\"add\"" : "\"replace\"");
+  now = settings;
+  return take(std::move(text), expected);
 }
 
 Result<void> WorldText::add_files(std::size_t layer, const std::vector<std::string>& files) {
@@ -227,6 +287,68 @@ Result<void> edit_world(const std::filesystem::path& file, const World& begin, c
   Result<void> edited = edit();
   if (!edited && is_new) std::filesystem::remove(file, failure);
   return edited;
+}
+
+namespace {
+
+/// The layer with the settings that a world file need not name.
+std::string without_settings(LayerSpec layer) {
+  static_cast<LayerSettings&>(layer) = {};
+  return to_toml(layer, {});
+}
+
+Result<void> put_in(const Globe& globe, WorldText& world) {
+  // Where each layer stands in the file, which may have been changed since it was opened.
+  std::vector<std::size_t> place;
+  for (const LayerSpec& layer : globe.world().layers) {
+    std::size_t i = 0;
+    const auto& written = world.world().layers;
+    while (i < written.size() && (std::ranges::find(place, i) != place.end() || without_settings(written[i]) != without_settings(layer))) ++i;
+    if (i == written.size())
+      return {ErrorCode::unsupported, fmt::format("{}: has no layer \"{}\" any more as it was opened; nothing has been saved", globe.world().file.string(), layer.name)};
+    place.push_back(i);
+  }
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (Result<void> set = world.set_settings(place[i], globe.layer_settings(i)); !set) return set;
+  }
+  // Each follows the one below it in its group.
+  const std::vector<std::size_t> order = globe.layer_order();
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const std::size_t above = place[order[i]], below = place[order[i - 1]];
+    if (globe.world().layers[order[i]].group != globe.world().layers[order[i - 1]].group || above > below) continue;
+    if (Result<void> moved = world.move_behind(above, below); !moved) return moved;
+    for (std::size_t& other : place) {
+      if (other == above) other = below;
+      else if (other > above && other <= below) --other;
+    }
+  }
+  return {};
+}
+
+bool is_default(const std::filesystem::path& file) {
+  const auto folder = default_data_folder();
+  std::error_code failure;
+  return folder && std::filesystem::equivalent(*folder / "world.toml", file, failure);
+}
+
+}  // namespace
+
+Result<std::filesystem::path> save_layers(const Globe& globe, const std::filesystem::path& folder) {
+  const std::filesystem::path& file = globe.world().file;
+  if (!file.empty() && !is_default(file)) {
+    if (Result<void> edited = edit_world(file, globe.world(), [&](WorldText& world) { return put_in(globe, world); }); !edited) return edited.error();
+    return file;
+  }
+  World world = globe.world();
+  world.layers.clear();
+  for (const std::size_t i : globe.layer_order()) {
+    world.layers.push_back(globe.world().layers[i]);
+    static_cast<LayerSettings&>(world.layers.back()) = globe.layer_settings(i);
+  }
+  std::filesystem::path made = folder / "world.toml";
+  for (int n = 2; std::filesystem::exists(made); ++n) made = folder / fmt::format("world-{}.toml", n);
+  if (Result<void> written = save_world(world, made); !written) return written.error();
+  return made;
 }
 
 }  // namespace tellurion::globe

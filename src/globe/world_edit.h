@@ -5,11 +5,14 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "globe/world.h"
 
 namespace tellurion::globe {
+
+class Globe;
 
 /// A world file's text and what it says. A change that would not give the world that it should is an error, and nothing has changed.
 class WorldText {
@@ -26,6 +29,9 @@ class WorldText {
   Result<void> add_layer(const LayerSpec& layer);
   /// With the comment lines right above it.
   Result<void> remove_layer(std::size_t layer);
+  Result<void> set_settings(std::size_t layer, const LayerSettings& settings);
+  /// Right behind another one, with the comment lines right above it.
+  Result<void> move_behind(std::size_t layer, std::size_t other);
   /// Into `files` of a layer of type "catalogue"; those that are in it already are passed over.
   Result<void> add_files(std::size_t layer, const std::vector<std::string>& files);
   /// Out of it. Errors: not_found, naming the first that is not in it; invalid_argument, if nothing would be left.
@@ -35,6 +41,7 @@ class WorldText {
   WorldText(std::string text, std::filesystem::path folder, std::string name, World world);
   /// Takes the new text if it says `expected`.
   Result<void> take(std::string text, const World& expected);
+  std::pair<std::size_t, std::size_t> lines_of(std::size_t layer) const;
 
   std::string text_;
   std::filesystem::path folder_;
@@ -45,5 +52,10 @@ class WorldText {
 /// Reads, changes and writes a world file, whole or not at all, while other processes that do the same wait. A file that is not there
 /// is begun with the planet of `begin`. Errors: those of load_world and of `change`; unavailable.
 Result<void> edit_world(const std::filesystem::path& file, const World& begin, const std::function<Result<void>(WorldText&)>& change);
+
+/// Keeps settings and order of layers as they are now in the world's file, where all else stays as it is. A world that is no file of the
+/// user's, as the default one or a raster, becomes a new file in `folder`. Gives the file. Errors: those of edit_world; unsupported (a
+/// layer is not in the file any more).
+Result<std::filesystem::path> save_layers(const Globe& globe, const std::filesystem::path& folder);
 
 }  // namespace tellurion::globe

@@ -173,6 +173,8 @@ std::string to_toml(const LayerSpec& layer, const std::filesystem::path& folder)
 
 std::string planet_to_toml(const World& world) { return text_of(toml::table{{"planet", planet_table(world)}}) + "\n"; }
 
+std::string to_toml(double value) { return text_of(toml::value<double>(value)); }
+
 std::string to_toml(const std::string& text) { return text_of(toml::value<std::string>(text)); }
 
 std::string to_toml(const World& world) {

@@ -11,6 +11,9 @@ namespace tellurion::globe {
 /// A layer as [[layer]], with paths as a world file in `folder` names them.
 std::string to_toml(const LayerSpec& layer, const std::filesystem::path& folder);
 
+/// A number, always with a point or exponent.
+std::string to_toml(double value);
+
 /// A string between double quotes.
 std::string to_toml(const std::string& text);
 

@@ -262,6 +262,43 @@ class Picture(WindowTest):
             viewer.key(key)
             self.assertLess((np.abs(viewer.screen("closed") - before).max(axis=-1) > 2).mean(), 1e-3, key)
 
+    def test_layers_are_switched_faded_and_saved(self):
+        file = self.folder / "mine.toml"
+        text = ('# My world.\n[[layer]]\ngroup = "color"  # below\nsource = { path = "%s" }\n\n# Above.\n[[layer]]\nname = "Lights"\ngroup = "color"\nsource = { path = "%s" }\n'
+                % (ROOT / "data/earth/blue_marble.tif", ROOT / "data/earth/night_lights.tif"))
+        file.write_text(text)
+        viewer = self.open(ALPS, world=[file])
+        viewer.key("F3")  # the panel covers the left; its first layer is the uppermost
+        beside = np.s_[:, 440:]
+        switch, fade, save, down = (33, 138), (80, 167), (88, 92), (95, 138)
+
+        def click(point):
+            viewer.do(*viewer.at(point), "sleep", HELD, "mousedown", 1, "sleep", HELD, "mouseup", 1)
+            viewer.settle()
+
+        def shown(name):
+            return viewer.screen(name)[beside]
+
+        lights = shown("lights")
+        click(switch)
+        marble = shown("marble")
+        self.assertGreater((np.abs(lights - marble).max(axis=-1) > 16).mean(), 0.2)
+        click(switch)
+        self.assertLess((np.abs(shown("again") - lights).max(axis=-1) > 2).mean(), 1e-3)
+        click(fade)
+        share = float((80 - 27) / (290 - 27))  # of the slider's way
+        mixed = np.abs(shown("mixed") - (share * lights + (1 - share) * marble))
+        self.assertLess(np.median(mixed), 12)
+        click(save)
+        saved = file.read_text()
+        self.assertRegex(saved, r'# Above\.\n\[\[layer\]\]\nopacity = 0\.\d+\nname = "Lights"')
+        self.assertEqual("".join(line for line in saved.splitlines(True) if not line.startswith("opacity")), text)
+        click(down)
+        self.assertLess((np.abs(shown("below") - marble).max(axis=-1) > 2).mean(), 1e-3)
+        click(save)
+        self.assertLess(file.read_text().index("Lights"), file.read_text().index("# below"))
+        self.assertEqual(viewer.close(), 0)
+
     def test_opengl_es_shows_the_same(self):
         pictures = []
         for api in ("core", "es"):

@@ -187,3 +187,49 @@ TEST_CASE("files are written whole, with their rights, through links, and by man
   CHECK(edit_world(folder / "none" / "w.toml", moon, [](WorldText&) { return Result<void>(); }).error().code == ErrorCode::unavailable);
   std::filesystem::remove_all(folder);
 }
+
+TEST_CASE("set_settings: values change where they stand or come right under the layer's header") {
+  WorldText world = world_text(with(kWorld, "name = \"Strips\"\n", "name = \"Strips\"\nopacity = 0.5  # so that one sees through\n"));
+  LayerSettings settings = world.world().layers[1];
+  settings.opacity = 0.25;
+  settings.enabled = false;
+  REQUIRE(world.set_settings(1, settings).has_value());
+  CHECK(world.text() == with(with(kWorld, "name = \"Strips\"\n", "name = \"Strips\"\nopacity = 0.25  # so that one sees through\n"), "[[layer]]  # strips\n",
+                             "[[layer]]  # strips\nenabled = false\n"));
+  CHECK(world.world().layers[1] == settings);
+  REQUIRE(world.set_settings(1, settings).has_value());
+  CHECK(world.world().layers[1] == settings);
+
+  LayerSettings heights = world.world().layers[0];
+  heights.adds = true;
+  REQUIRE(world.set_settings(0, heights).has_value());
+  CHECK(world.text().find("[[layer]]\nmode = \"add\"\ngroup = \"height\"\n") != std::string::npos);
+}
+
+TEST_CASE("set_settings, move_behind: layers in one array cannot be told apart by lines, and stay") {
+  WorldText world = world_text("layer = [{ group = \"color\", source = { path = \"a.tif\" } }, { group = \"color\", source = { path = \"b.tif\" } }]\n");
+  const std::string before = world.text();
+  LayerSettings settings;
+  settings.opacity = 0.5;
+  CHECK(world.set_settings(0, settings).error().code == ErrorCode::unsupported);
+  CHECK(world.move_behind(0, 1).error().code == ErrorCode::unsupported);
+  CHECK(world.text() == before);
+}
+
+TEST_CASE("move_behind: a layer takes its comments along, up and down, and from the end of a file without a last line end") {
+  WorldText world = world_text(kWorld);
+  REQUIRE(world.move_behind(1, 2).has_value());
+  CHECK(world.world().layers[1].name == "Site");
+  CHECK(world.world().layers[2].name == "Strips");
+  CHECK(world.text().find("# Last.\n[[layer]]\n") < world.text().find("[[layer]]  # strips\n"));
+  REQUIRE(world.move_behind(2, 0).has_value());
+  CHECK(world.world().layers[1].name == "Strips");
+  CHECK(world.text().size() == std::string(kWorld).size());
+
+  WorldText open_end = world_text(std::string(kWorld).substr(0, std::string(kWorld).size() - 1));
+  REQUIRE(open_end.move_behind(2, 1).has_value());
+  REQUIRE(open_end.move_behind(1, 2).has_value());
+  CHECK(open_end.world().layers[1].name == "Site");
+  REQUIRE(open_end.move_behind(2, 0).has_value());
+  CHECK(open_end.world().layers[1].name == "Strips");
+}
