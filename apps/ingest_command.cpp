@@ -138,6 +138,10 @@ void add_format_options(CLI::App& command, prepare::IngestOptions& options) {
   command.add_option_function<std::string>("--block", [&options](const std::string& t) { options.block = one_of("--block", t, {"256", "512"}) == "256" ? 256 : 512; }, "side of blocks in pixels (512)")->type_name("256|512");
 }
 
+void add_repair_options(CLI::App& command, prepare::RepairOptions& repair) {
+  command.add_option("--fill-voids", repair.fill_voids, "fill voids of heights that are at most so many pixels wide and high")->check(CLI::Range(1, 2048))->type_name("PIXELS");
+}
+
 }  // namespace
 
 void add_ingest(CLI::App& app, Run& run) {
@@ -153,6 +157,7 @@ void add_ingest(CLI::App& app, Run& run) {
   command->add_option("INPUT", options.inputs, "rasters that GDAL opens, and folders of them")->type_name("");
   command->add_option("--out", options.out, "the GeoTIFF to write; FILE.tif.work keeps what is done")->check(has_ending(".tif"))->type_name("FILE.tif");
   add_format_options(*command, options);
+  add_repair_options(*command, options.repair);
   command->add_option("--workers", options.workers, "threads (all cores)")->check(CLI::Range(1, 256))->type_name("N");
   command->add_option_function<std::size_t>("--memory", [&options](const std::size_t& mb) { options.memory_bytes = mb << 20; }, "bound of the memory used (1024)")
       ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 20))->type_name("MB");

@@ -17,6 +17,13 @@ namespace tellurion::prepare {
 
 enum class IngestKind { height, picture };
 
+/// What is mended in what the inputs hold.
+struct RepairOptions {
+  int fill_voids = 0;  ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
+
+  bool any() const { return fill_voids > 0; }
+};
+
 struct IngestOptions {
   std::vector<std::string> inputs;       ///< what GDAL opens, or folders of it; where two overlap the finer one is on top, else the later one
   std::filesystem::path out;
@@ -27,6 +34,7 @@ struct IngestOptions {
   std::optional<double> no_data{};       ///< of the inputs, over what they say
   std::string resampling = "bilinear";   ///< where grids differ, in GDAL's words
   std::optional<std::string> compress{}; ///< in GDAL's words; nothing: DEFLATE, for pictures JPEG, or WEBP with alpha
+  RepairOptions repair{};
   int level = 6;
   int quality = 85;
   int block = 512;

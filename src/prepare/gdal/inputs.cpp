@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -20,6 +19,7 @@
 
 #include "base/hash.h"
 #include "prepare/gdal/gdal_types.h"
+#include "prepare/gdal/memory_files.h"
 #include "source/gdal/gdal_runtime.h"
 #include "source/undeclared_voids.h"
 
@@ -60,25 +60,6 @@ struct Input {
   bool warped = false;
   double fineness = 1.0;      ///< output pixels for one of its own, where it is warped
   Rectangle place;            ///< on the output's grid
-};
-
-/// Names of files in GDAL's memory, unlinked at the end.
-class MemoryFiles {
- public:
-  MemoryFiles() = default;
-  ~MemoryFiles() {
-    for (const std::string& name : names_) VSIUnlink(name.c_str());
-  }
-  MemoryFiles(const MemoryFiles&) = delete;
-  MemoryFiles& operator=(const MemoryFiles&) = delete;
-
-  std::string add() {
-    static std::atomic<std::uint64_t> count{0};
-    return names_.emplace_back(fmt::format("/vsimem/tellurion-ingest-{}.vrt", ++count));
-  }
-
- private:
-  std::vector<std::string> names_;
 };
 
 Error unsupported(const Input& input, const std::string& what) { return {ErrorCode::unsupported, fmt::format("{}: {}", input.path, what)}; }
@@ -600,15 +581,15 @@ bool is_the_output(const std::vector<Input>& inputs, const OutputPlan& plan) {
 }
 
 /// What every chunk depends on.
-void hash_chunks(const std::vector<Input>& inputs, const IngestOptions& options, OutputPlan& plan) {
-  const std::string common = fmt::format("{}|{}|GDAL {}", plan.description(), options.resampling, GDALVersionInfo("VERSION_NUM"));
+void hash_chunks(const std::vector<Input>& inputs, const IngestOptions& options, const RepairPlan& repair, OutputPlan& plan) {
+  const std::string common = fmt::format("{}|{}|GDAL {}{}", plan.description(), options.resampling, GDALVersionInfo("VERSION_NUM"), repair.description());
   plan.chunk_hashes.assign(static_cast<std::size_t>(plan.chunk_columns()) * static_cast<std::size_t>(plan.chunk_rows()), "");
   for (std::size_t i = 0; i < plan.chunk_hashes.size(); ++i) {
     const Chunk chunk = chunk_of(plan, static_cast<int>(i));
     std::string text;
     for (const Input& input : inputs) {
       // Resampling reaches beyond a pixel by a few of the coarser of the two grids.
-      const double reach = 4.0 * std::max({1.0, input.place.width / input.columns, input.place.height / input.rows});
+      const double reach = repair.margin() + 4.0 * std::max({1.0, input.place.width / input.columns, input.place.height / input.rows});
       const Rectangle& place = input.place;
       const bool touches = place.x - reach < chunk.x + chunk.width && chunk.x < place.x + place.width + reach && place.y - reach < chunk.y + chunk.height && chunk.y < place.y + place.height + reach;
       if (touches) text += fmt::format("|{} {} {} {} {} {}", input.revision, place.x, place.y, place.width, place.height, input.warped ? source::wkt_of(input.crs) : "");
@@ -657,7 +638,10 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   OGRSpatialReference declared = *crs;
   if (Result<void> put = declare_vertical(options, declared); !put) return put.error();
   plan.crs = source::wkt_of(declared);
-  hash_chunks(inputs, options, plan);
+  Result<RepairPlan> repair = RepairPlan::create(options.repair, inputs.front().kind, plan);
+  if (!repair) return repair.error();
+  mosaic.repair_ = std::move(*repair);
+  hash_chunks(inputs, options, mosaic.repair_, plan);
   for (Input& input : inputs) {
     if (!input.warped) continue;
     if (Result<void> warped = warp(input, options, before, *files); !warped) return warped.error();
