@@ -140,6 +140,8 @@ void add_format_options(CLI::App& command, prepare::IngestOptions& options) {
 
 void add_repair_options(CLI::App& command, prepare::RepairOptions& repair) {
   command.add_option("--fill-voids", repair.fill_voids, "fill voids of heights that are at most so many pixels wide and high")->check(CLI::Range(1, 2048))->type_name("PIXELS");
+  command.add_option_function<std::string>("--fill-from", [&repair](const std::string& t) { repair.fill_from = t; }, "take what is missing from this raster, fitted to its surroundings in colour or height")
+      ->type_name("FILE");
 }
 
 }  // namespace

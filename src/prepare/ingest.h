@@ -19,9 +19,10 @@ enum class IngestKind { height, picture };
 
 /// What is mended in what the inputs hold.
 struct RepairOptions {
-  int fill_voids = 0;  ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
+  int fill_voids = 0;                      ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
+  std::optional<std::string> fill_from{};  ///< a raster that covers all; what is missing comes from it, fitted to its surroundings
 
-  bool any() const { return fill_voids > 0; }
+  bool any() const { return fill_voids > 0 || fill_from; }
 };
 
 struct IngestOptions {

@@ -27,11 +27,13 @@ T sample_of(double value, const Voids<T>& voids) {
   }
 }
 
+template <class T>
+constexpr T kOpaque = static_cast<T>(std::is_same_v<T, std::uint16_t> ? 65535 : 255);
+
 /// From 0 to 1.
 template <class T>
 double opacity(T alpha) {
-  constexpr double kOpaque = std::is_same_v<T, std::uint16_t> ? 65535.0 : 255.0;
-  return std::clamp(static_cast<double>(alpha) / kOpaque, 0.0, 1.0);
+  return std::clamp(static_cast<double>(alpha) / static_cast<double>(kOpaque<T>), 0.0, 1.0);
 }
 
 }  // namespace
@@ -65,6 +67,17 @@ void fill_band(const SampleLayout& layout, Samples& samples, int band, const Pla
       T& sample = pixel[band];
       const double share = layout.alpha ? opacity(pixel[layout.bands - 1]) : voids.contains(sample) ? 0.0 : 1.0;
       if (share < 1.0 && !std::isnan(value)) sample = sample_of(share > 0.0 ? share * static_cast<double>(sample) + (1.0 - share) * static_cast<double>(value) : static_cast<double>(value), voids);
+      pixel += layout.bands;
+    }
+  });
+}
+
+void make_opaque(const SampleLayout& layout, Samples& samples, const Plane& plane) {
+  with_type(layout.type, [&](auto type) {
+    using T = decltype(type);
+    T* pixel = as<T>(samples);
+    for (const float value : plane.values) {
+      if (!std::isnan(value)) pixel[layout.bands - 1] = kOpaque<T>;
       pixel += layout.bands;
     }
   });

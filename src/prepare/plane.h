@@ -25,8 +25,11 @@ Plane void_plane(int width, int height);
 Plane plane_of(const SampleLayout& layout, const Samples& samples, int band);
 
 /// Puts what is not void of `plane` into the band in place of the voids there; rounded half up and within the range of the type.
-/// Where there is alpha, pixels that are partly transparent are laid over the plane, and `alpha` has to be made opaque afterwards.
+/// Where there is alpha, pixels that are partly transparent are laid over the plane; make_opaque has to follow.
 void fill_band(const SampleLayout& layout, Samples& samples, int band, const Plane& plane);
+
+/// Makes pixels opaque where `plane` is not void.
+void make_opaque(const SampleLayout& layout, Samples& samples, const Plane& plane);
 
 /// The window of `from` at column `x` and row `y`.
 Samples cut_window(const SampleLayout& layout, const Samples& from, int x, int y, int width, int height);

@@ -47,6 +47,13 @@ class RepairCase(Case):
         self.assertEqual(out.read_bytes(), (self.folder / "shards.tif").read_bytes())
         return out
 
+    def stays_within(self, megabytes, *arguments):
+        """The memory that the program takes."""
+        command = [PROGRAM, "ingest", *map(str, arguments), "--out", str(self.folder / "bounded.tif"), "--memory", str(megabytes), "--workers", "2"]
+        script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True); print('kB', resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+        done = subprocess.run(["/usr/bin/python3", "-c", script, *command], check=True, capture_output=True, text=True)
+        self.assertLess(int(done.stdout.split("kB")[1]), megabytes * 1024)
+
 
 def read(file):
     return gdal.Open(str(file)).ReadAsArray()
@@ -121,11 +128,7 @@ class Voids(RepairCase):
 
     def test_memory_stays_within_its_bound(self):
         h = self.holed
-        four = self.write("memory.tif", np.block([[h, h[:, ::-1]], [h[::-1], h[::-1, ::-1]]]))
-        command = [PROGRAM, "ingest", str(four), "--fill-voids", "300", "--out", str(self.folder / "bounded.tif"), "--memory", "320", "--workers", "2"]
-        script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True); print('kB', resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
-        done = subprocess.run(["/usr/bin/python3", "-c", script, *command], check=True, capture_output=True, text=True)
-        self.assertLess(int(done.stdout.split("kB")[1]), 320 * 1024)
+        self.stays_within(320, self.write("memory.tif", np.block([[h, h[:, ::-1]], [h[::-1], h[::-1, ::-1]]])), "--fill-voids", 300)
 
     def test_pictures_have_no_such_voids(self):
         self.refused(shared(BLUE_MARBLE), "--fill-voids", 10, naming="--fill-voids")
@@ -138,6 +141,125 @@ class Voids(RepairCase):
         raster.GetRasterBand(1).SetNoDataValue(VOID)
         raster.WriteArray(heights)
         return self.folder / name
+
+
+def turned_squares(rows, columns, places, half_width, half_height):
+    """Where scenes are missing: rectangles about (x, y), each turned otherwise."""
+    y, x = np.mgrid[0:rows, 0:columns]
+    missing = np.zeros((rows, columns), bool)
+    for angle, (left, top) in enumerate(places, 1):
+        along, across = (x - left) * np.cos(angle) + (y - top) * np.sin(angle), (y - top) * np.cos(angle) - (x - left) * np.sin(angle)
+        missing |= (abs(along) < half_width) & (abs(across) < half_height)
+    return missing
+
+
+def steps_across(border_of, bands):
+    """The mean difference of neighbours of which one is in the mask and one is not."""
+    down, right = border_of[:-1] != border_of[1:], border_of[:, :-1] != border_of[:, 1:]
+    return float(np.concatenate([np.abs(np.diff(bands.astype(int), axis=1))[:, down].ravel(), np.abs(np.diff(bands.astype(int), axis=2))[:, right].ravel()]).mean())
+
+
+class Base(RepairCase):
+    """Holes in Blue Marble, filled from another picture of the Earth: Blue Marble Next Generation, of another month and half as fine."""
+
+    BASE = "earth/imagery/bmng_200405_2048.jpg"
+    HOLES = ((2250, 700), (2500, 1150), (1000, 1100), (3300, 600), (900, 500), (3700, 1300), (2150, 850), (2048, 400))
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.truth = read(shared(BLUE_MARBLE))
+        cls.missing = turned_squares(*cls.truth.shape[1:], cls.HOLES, 90, 60)
+        cls.source = cls.with_holes("holes.tif", cls.missing)
+
+    @classmethod
+    def with_holes(cls, name, missing):
+        file = cls.folder / name
+        raster = gdal.GetDriverByName("GTiff").Create(str(file), missing.shape[1], missing.shape[0], 4, gdal.GDT_Byte, ["TILED=YES", "ALPHA=YES"])
+        like = gdal.Open(str(shared(BLUE_MARBLE)))
+        raster.SetProjection(like.GetProjection())
+        raster.SetGeoTransform(like.GetGeoTransform())
+        raster.WriteArray(np.concatenate([np.where(missing, 0, cls.truth), np.where(missing, 0, 255)[np.newaxis]]).astype(np.uint8))
+        return file
+
+    def test_no_seam_shows_and_the_colours_are_nearer_to_the_truth_than_the_base_s(self):
+        filled = read(self.same_however_made(self.source, "--fill-from", shared(self.BASE), "--compress", "deflate"))
+        self.assertTrue(np.all(filled[3] == 255))
+        np.testing.assert_array_equal(filled[:3][:, ~self.missing], self.truth[:, ~self.missing])
+        like = self.truth.shape
+        base = gdal.Warp("", str(shared(self.BASE)), format="MEM", width=like[2], height=like[1], resampleAlg="bilinear").ReadAsArray()
+        pasted = np.where(self.missing, base, self.truth)
+        error = lambda bands: float(np.abs(bands.astype(int) - self.truth)[:, self.missing].mean())
+        steps = {name: steps_across(self.missing, bands) for name, bands in (("truth", self.truth), ("pasted", pasted), ("filled", filled[:3]))}
+        print(f"mean difference from the truth: base as it is {error(pasted):.2f}, fitted {error(filled[:3]):.2f}; "
+              f"step across the border: truth {steps['truth']:.2f}, base as it is {steps['pasted']:.2f}, fitted {steps['filled']:.2f}")
+        self.assertLess(error(filled[:3]), 0.7 * error(pasted))
+        self.assertLess(steps["filled"], steps["truth"])
+
+    def test_a_base_of_other_tint_gives_the_truth_again(self):
+        tinted = copy_with(self.folder / "tinted.tif", shared(BLUE_MARBLE), np.floor(self.truth * np.array([0.7, 0.8, 0.9])[:, None, None] + np.array([40, 20, 5])[:, None, None]).astype(np.uint8))
+        out, _ = self.ingest(self.source, "--fill-from", tinted, "--compress", "deflate", out="untinted.tif")
+        error = np.abs(read(out)[:3].astype(int) - self.truth)[:, self.missing].mean()
+        before = np.abs(read(tinted).astype(int) - self.truth)[:, self.missing].mean()
+        print(f"a base that differs by {before:.1f} on average: what is filled differs by {error:.2f}")
+        self.assertLess(error, 0.05 * before)
+
+    def test_where_no_input_lies_there_is_the_base(self):
+        left = gdal.Translate(str(self.folder / "left.tif"), str(shared(BLUE_MARBLE)), srcWin=[0, 0, 600, 300])
+        right = gdal.Translate(str(self.folder / "right.tif"), str(shared(BLUE_MARBLE)), srcWin=[3400, 1700, 600, 300])
+        left = right = None
+        out, _ = self.ingest(self.folder / "left.tif", self.folder / "right.tif", "--fill-from", shared(BLUE_MARBLE), "--compress", "deflate", out="corners.tif")
+        filled = read(out)
+        self.assertTrue(np.all(filled[3] == 255))
+        np.testing.assert_array_equal(filled[:3], self.truth[:, :2000, :4000])
+
+    def test_a_changed_base_makes_all_anew(self):
+        base = self.folder / "base.jpg"
+        base.write_bytes(shared(self.BASE).read_bytes())
+        (self.folder / "base.jpg.aux.xml").write_bytes(pathlib.Path(f"{shared(self.BASE)}.aux.xml").read_bytes())
+        self.ingest(self.source, "--fill-from", base, out="changed.tif")
+        self.assertIn("up to date", self.ingest(self.source, "--fill-from", base, out="changed.tif")[1].stdout)
+        base.write_bytes(base.read_bytes() + b"\0")
+        self.assertIn("2 of 2 chunks made", self.ingest(self.source, "--fill-from", base, out="changed.tif")[1].stdout)
+
+    def test_memory_stays_within_its_bound(self):
+        self.stays_within(512, self.source, "--fill-from", shared(self.BASE))
+
+    def test_bad_bases_are_named(self):
+        text = self.folder / "text.txt"
+        text.write_text("no raster")
+        for base in (text, self.folder / "nothing.tif", shared(RAINIER)):
+            with self.subTest(str(base)):
+                self.refused(self.source, "--fill-from", base, naming=base)
+
+
+class BaseOfHeights(RepairCase):
+    def test_a_coarse_model_on_its_own_datum_fills_without_a_step(self):
+        truth = read(self.ingest(shared(RAINIER), "--fill-voids", 100, out="truth.tif")[0])
+        missing = turned_squares(*truth.shape, ((400, 700), (800, 400)), 110, 90)
+        holed = copy_with(self.folder / "holed.tif", shared(RAINIER), np.where(missing, VOID, truth).astype(np.int16))
+        coarse = self.folder / "coarse.tif"
+        gdal.Warp(str(coarse), str(self.folder / "truth.tif"), xRes=0.01, yRes=0.01, resampleAlg="average", outputType=gdal.GDT_Float32)
+        raster = gdal.Open(str(coarse), gdal.GA_Update)
+        raster.WriteArray(raster.ReadAsArray() + 25)  # another datum
+        raster = None
+        filled = read(self.ingest(holed, "--fill-from", coarse)[0])
+        self.assertEqual((filled == VOID).sum(), 0)
+        plain = gdal.Warp("", str(coarse), format="MEM", width=1201, height=1201, outputBounds=self.bounds(holed), resampleAlg="bilinear").ReadAsArray()
+        pasted = np.where(missing, plain, truth)
+        smooth = read(self.ingest(holed, "--fill-voids", 400, out="smooth.tif")[0])
+        errors = {name: rms((heights - truth)[missing]) for name, heights in (("pasted", pasted), ("smooth", smooth), ("filled", filled))}
+        steps = {name: steps_across(missing, heights[np.newaxis]) for name, heights in (("truth", truth), ("pasted", pasted), ("filled", filled))}
+        print(f"RMS error: base as it is {errors['pasted']:.1f} m, --fill-voids {errors['smooth']:.1f} m, fitted {errors['filled']:.1f} m; "
+              f"step across the border: truth {steps['truth']:.1f} m, base as it is {steps['pasted']:.1f} m, fitted {steps['filled']:.1f} m")
+        self.assertLess(errors["filled"], 0.95 * errors["pasted"])
+        self.assertLess(steps["filled"], 1.3 * steps["truth"])
+
+    @staticmethod
+    def bounds(file):
+        raster = gdal.Open(str(file))
+        t = raster.GetGeoTransform()
+        return (t[0], t[3] + raster.RasterYSize * t[5], t[0] + raster.RasterXSize * t[1], t[3])
 
 
 if __name__ == "__main__":

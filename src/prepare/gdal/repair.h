@@ -2,9 +2,11 @@
 // Thread-safe: values and pure functions.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "base/result.h"
+#include "prepare/gdal/base_raster.h"
 #include "prepare/ingest.h"
 #include "prepare/plan.h"
 
@@ -12,10 +14,13 @@ namespace tellurion::prepare {
 
 class RepairPlan {
  public:
-  /// Errors: invalid_argument, saying what to do.
-  static Result<RepairPlan> create(const RepairOptions& options, IngestKind kind, const OutputPlan& plan);
+  /// `plan` in the CRS of what is read. Errors: as `ingest`.
+  static Result<RepairPlan> create(const IngestOptions& options, IngestKind kind, const OutputPlan& plan);
 
   const RepairOptions& options() const { return options_; }
+  const BaseRaster* base() const { return base_.get(); }
+  /// Where windows with a margin begin: at multiples of it.
+  int grid() const;
   /// How far from a pixel lies what it may depend on, in pixels.
   int margin() const;
   /// What the samples depend on, beside the inputs; empty: nothing is mended.
@@ -25,6 +30,7 @@ class RepairPlan {
 
  private:
   RepairOptions options_;
+  std::shared_ptr<const BaseRaster> base_;
 };
 
 }  // namespace tellurion::prepare

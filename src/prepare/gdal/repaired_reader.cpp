@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "prepare/base_fill.h"
 #include "prepare/plane.h"
 
 namespace tellurion::prepare {
@@ -18,26 +19,49 @@ bool has_voids(const Plane& plane) {
 Result<RepairedReader> RepairedReader::create(const Mosaic& mosaic) {
   Result<GDALDatasetUniquePtr> dataset = mosaic.open();
   if (!dataset) return dataset.error();
-  return RepairedReader(mosaic, std::move(dataset).value());
+  if (mosaic.repair().base() == nullptr) return RepairedReader(mosaic, std::move(dataset).value(), nullptr);
+  Result<GDALDatasetUniquePtr> base = mosaic.repair().base()->open();
+  if (!base) return base.error();
+  return RepairedReader(mosaic, std::move(dataset).value(), std::move(base).value());
 }
 
 Result<Samples> RepairedReader::read(int x, int y, int width, int height) {
-  Result<Samples> samples = read_window(*dataset_, plan_->layout, x, y, width, height);
+  Result<Samples> samples = read_mosaic({x, y, width, height});
   if (!samples || !repair_->options().any() || !has_voids(plane_of(plan_->layout, *samples, 0))) return samples;
-  PixelBox inner;
-  samples = read_around(x, y, width, height, inner);
+  const PixelBox box = with_margin({x, y, width, height}), inner{x - box.x, y - box.y, width, height};
+  samples = read_mosaic(box);
   if (!samples) return samples;
-  Plane heights = plane_of(plan_->layout, *samples, 0);
-  fill_voids(heights, inner, repair_->options().fill_voids);
-  fill_band(plan_->layout, *samples, 0, heights);
+  if (base_) {
+    if (Result<void> filled = fill_from_base(box, *samples); !filled) return filled.error();
+  }
+  if (repair_->options().fill_voids > 0) {
+    Plane heights = plane_of(plan_->layout, *samples, 0);
+    fill_voids(heights, inner, repair_->options().fill_voids);
+    fill_band(plan_->layout, *samples, 0, heights);
+  }
   return cut_window(plan_->layout, *samples, inner.x, inner.y, width, height);
 }
 
-Result<Samples> RepairedReader::read_around(int x, int y, int width, int height, PixelBox& inner) {
-  const int margin = repair_->margin();
-  const int left = std::max(x - margin, 0), top = std::max(y - margin, 0);
-  inner = {x - left, y - top, width, height};
-  return read_window(*dataset_, plan_->layout, left, top, std::min(x + width + margin, plan_->width) - left, std::min(y + height + margin, plan_->height) - top);
+Result<Samples> RepairedReader::read_mosaic(const PixelBox& box) { return read_window(*dataset_, plan_->layout, box.x, box.y, box.width, box.height); }
+
+PixelBox RepairedReader::with_margin(const PixelBox& box) const {
+  const int margin = repair_->margin(), grid = repair_->grid();
+  const int left = std::max(box.x - margin, 0) / grid * grid, top = std::max(box.y - margin, 0) / grid * grid;
+  return {left, top, std::min(box.x + box.width + margin, plan_->width) - left, std::min(box.y + box.height + margin, plan_->height) - top};
+}
+
+Result<void> RepairedReader::fill_from_base(const PixelBox& box, Samples& samples) {
+  const SampleLayout& layout = repair_->base()->layout();
+  const Result<Samples> base = read_window(*base_, layout, box.x, box.y, box.width, box.height);
+  if (!base) return base.error();
+  const int colours = layout.bands - (layout.alpha ? 1 : 0);
+  Plane filling;
+  for (int band = 0; band < colours; ++band) {
+    filling = prepare::fill_from_base(plane_of(plan_->layout, samples, band), plane_of(layout, *base, band));
+    fill_band(plan_->layout, samples, band, filling);
+  }
+  if (plan_->layout.alpha) make_opaque(plan_->layout, samples, filling);
+  return {};
 }
 
 }  // namespace tellurion::prepare

@@ -18,14 +18,18 @@ class RepairedReader {
   Result<Samples> read(int x, int y, int width, int height);
 
  private:
-  RepairedReader(const Mosaic& mosaic, GDALDatasetUniquePtr dataset) : plan_(&mosaic.plan()), repair_(&mosaic.repair()), dataset_(std::move(dataset)) {}
+  RepairedReader(const Mosaic& mosaic, GDALDatasetUniquePtr dataset, GDALDatasetUniquePtr base)
+      : plan_(&mosaic.plan()), repair_(&mosaic.repair()), dataset_(std::move(dataset)), base_(std::move(base)) {}
 
-  /// The window and the margin around it; `inner` is where in it the window lies.
-  Result<Samples> read_around(int x, int y, int width, int height, PixelBox& inner);
+  Result<Samples> read_mosaic(const PixelBox& box);
+  /// The box and the margin around it.
+  PixelBox with_margin(const PixelBox& box) const;
+  Result<void> fill_from_base(const PixelBox& box, Samples& samples);
 
   const OutputPlan* plan_;
   const RepairPlan* repair_;
   GDALDatasetUniquePtr dataset_;
+  GDALDatasetUniquePtr base_;
 };
 
 }  // namespace tellurion::prepare
