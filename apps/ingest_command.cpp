@@ -142,6 +142,10 @@ void add_repair_options(CLI::App& command, prepare::RepairOptions& repair) {
   command.add_option("--fill-voids", repair.fill_voids, "fill voids of heights that are at most so many pixels wide and high")->check(CLI::Range(1, 2048))->type_name("PIXELS");
   command.add_option_function<std::string>("--fill-from", [&repair](const std::string& t) { repair.fill_from = t; }, "take what is missing from this raster, fitted to its surroundings in colour or height")
       ->type_name("FILE");
+  CLI::Option* coast = command.add_option_function<std::string>("--coast", [&repair](const std::string& t) { repair.coast = t; }, "a file of polygons of land (Shapefile, GeoPackage, GeoJSON)");
+  CLI::Option* beyond = command.add_option("--sea-beyond", repair.sea_beyond, "cut away the sea that is farther than this off the coast")->check(in_range(0.0, 2e7));
+  coast->needs(beyond)->type_name("FILE");
+  beyond->needs(coast)->type_name("METRES");
 }
 
 }  // namespace

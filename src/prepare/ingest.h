@@ -21,8 +21,11 @@ enum class IngestKind { height, picture };
 struct RepairOptions {
   int fill_voids = 0;                      ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
   std::optional<std::string> fill_from{};  ///< a raster that covers all; what is missing comes from it, fitted to its surroundings
+  std::optional<std::string> coast{};      ///< a file of polygons of land, off which the sea is cut away beyond `sea_beyond`
+  double sea_beyond = 0.0;                 ///< metres over ground
 
-  bool any() const { return fill_voids > 0 || fill_from; }
+  bool fills() const { return fill_voids > 0 || fill_from; }
+  bool any() const { return fills() || coast; }
 };
 
 struct IngestOptions {

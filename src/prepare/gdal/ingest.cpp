@@ -101,13 +101,13 @@ IngestReport report_of(const OutputPlan& plan) {
 
 /// How many workers the memory is enough for. Errors: exhausted.
 Result<int> affordable_workers(const Mosaic& mosaic, const IngestOptions& options) {
-  const std::size_t one = worker_bytes(mosaic.plan(), mosaic.repair()), least = kProgramBytes + kLeastCacheBytes + one;
+  const std::size_t one = worker_bytes(mosaic.plan(), mosaic.repair()), shared = mosaic.repair().shared_bytes(), least = kProgramBytes + shared + kLeastCacheBytes + one;
   if (options.memory_bytes < least) {
     return {ErrorCode::exhausted, fmt::format("this needs more memory than {} MB; say --memory {} or more, or --block 256", options.memory_bytes >> 20, (least >> 20) + 1)};
   }
-  const std::size_t cache = std::max(kLeastCacheBytes, options.memory_bytes / 8);
+  const std::size_t cache = std::clamp(options.memory_bytes / 8, kLeastCacheBytes, kLeastCacheBytes + options.memory_bytes - least);
   source::configure_gdal(cache);
-  return std::max(1, static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.workers), (options.memory_bytes - kProgramBytes - cache) / one)));
+  return std::max(1, static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.workers), (options.memory_bytes - kProgramBytes - shared - cache) / one)));
 }
 
 /// The chunks of the shard that are not done. A damaged one is not.

@@ -22,21 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr double kWarpTolerance = 0.01;  ///< pixels of an input: GDAL's 0.125 are ten metres on a mountain of pixels of 90
 
-/// Names, sizes and times of all files that a data set is made of.
-std::string revision_of(GDALDataset& dataset, const std::string& path) {
-  std::string text = path;
-  char** files = dataset.GetFileList();
-  for (int i = 0; i < CSLCount(files); ++i) {
-    std::error_code error;
-    const auto size = fs::file_size(files[i], error);
-    if (error) continue;
-    const auto time = fs::last_write_time(files[i], error);
-    text += fmt::format("|{} {} {}", files[i], size, time.time_since_epoch().count());
-  }
-  CSLDestroy(files);
-  return text;
-}
-
 IngestKind guess_kind(GDALDataset& dataset) {
   GDALRasterBand* band = dataset.GetRasterBand(1);
   if (band->GetColorTable() != nullptr || dataset.GetRasterCount() >= 3) return IngestKind::picture;
@@ -129,6 +114,20 @@ Result<void> inspect_bands(Input& input, GDALDatasetUniquePtr& dataset, const In
 }  // namespace
 
 Error unsupported(const Input& input, const std::string& what) { return {ErrorCode::unsupported, fmt::format("{}: {}", input.path, what)}; }
+
+std::string revision_of(GDALDataset& dataset, const std::string& path) {
+  std::string text = path;
+  char** files = dataset.GetFileList();
+  for (int i = 0; i < CSLCount(files); ++i) {
+    std::error_code error;
+    const auto size = fs::file_size(files[i], error);
+    if (error) continue;
+    const auto time = fs::last_write_time(files[i], error);
+    text += fmt::format("|{} {} {}", files[i], size, time.time_since_epoch().count());
+  }
+  CSLDestroy(files);
+  return text;
+}
 
 Result<Input> inspect(const std::string& path, const IngestOptions& options, MemoryFiles& files) {
   Result<GDALDatasetUniquePtr> opened = source::open_dataset(path);

@@ -55,6 +55,9 @@ struct Extent {
 
 Error unsupported(const Input& input, const std::string& what);
 
+/// Names, sizes and times of all files that a data set is made of.
+std::string revision_of(GDALDataset& dataset, const std::string& path);
+
 /// Opens and looks at it; what has to be made to read it comes into `files`. Errors: as `ingest`.
 Result<Input> inspect(const std::string& path, const IngestOptions& options, MemoryFiles& files);
 

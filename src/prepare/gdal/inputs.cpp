@@ -209,19 +209,19 @@ bool holds(SampleType type, double value) {
   return false;
 }
 
-void choose_height_samples(const std::vector<Input>& inputs, OutputPlan& plan) {
+void choose_height_samples(const std::vector<Input>& inputs, bool has_voids, OutputPlan& plan) {
   SampleLayout& layout = plan.layout;
   for (const Input& input : inputs) {
     if (!layout.no_data && input.no_data && holds(layout.type, *input.no_data)) layout.no_data = input.no_data;
   }
-  if (layout.no_data || cover_all(inputs, plan)) return;
+  if (layout.no_data || !has_voids) return;
   if (layout.type == SampleType::u8) layout.type = SampleType::i16;
   if (layout.type == SampleType::u16) layout.type = SampleType::i32;
   if (layout.type == SampleType::u32) layout.type = SampleType::f64;
   layout.no_data = kOwnVoid;
 }
 
-Result<void> choose_samples(const std::vector<Input>& inputs, OutputPlan& plan) {
+Result<void> choose_samples(const std::vector<Input>& inputs, const IngestOptions& options, OutputPlan& plan) {
   const Input& first = inputs.front();
   SampleLayout& layout = plan.layout;
   GDALDataType type = gdal_type(first.type);
@@ -238,11 +238,12 @@ Result<void> choose_samples(const std::vector<Input>& inputs, OutputPlan& plan) 
   }
   if (!sample_type(type)) return unsupported(first, "and the other inputs have no common type of samples; bring them to one first: gdal_translate -ot");
   layout.type = *sample_type(type);
+  const bool has_voids = options.repair.coast || !cover_all(inputs, plan);
   if (first.kind == IngestKind::height) {
-    choose_height_samples(inputs, plan);
+    choose_height_samples(inputs, has_voids, plan);
   } else {
     if (inputs.size() > 1 && first.type != layout.type) return unsupported(first, "and other pictures have samples of different depth; bring them to one first: gdal_translate -ot Byte -scale");
-    layout.alpha = transparent || !cover_all(inputs, plan);
+    layout.alpha = transparent || has_voids;
   }
   layout.bands = first.colours + (layout.alpha ? 1 : 0);
   for (int i = 1; i <= layout.bands; ++i) {
@@ -374,7 +375,7 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   plan.block = options.block;
   plan.point_samples = std::all_of(inputs.begin(), inputs.end(), [](const Input& input) { return input.point_samples; });
   if (Result<void> chosen = choose_grid(options, inputs, plan, plan.crs); !chosen) return chosen.error();
-  if (Result<void> chosen = choose_samples(inputs, plan); !chosen) return chosen.error();
+  if (Result<void> chosen = choose_samples(inputs, options, plan); !chosen) return chosen.error();
   if (Result<void> chosen = choose_codec(options, inputs, plan); !chosen) return chosen.error();
   choose_chunks(plan, options.repair.any() ? 0 : stored_row_pixels(inputs));  // wide ones cost memory for margins
   // Finer ones over coarser ones; of one fineness the later over the earlier.

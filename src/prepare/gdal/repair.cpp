@@ -16,10 +16,16 @@ Result<RepairPlan> RepairPlan::create(const IngestOptions& options, IngestKind k
   if (repair.options_.fill_voids > 0 && kind != IngestKind::height) {
     return {ErrorCode::invalid_argument, "--fill-voids is for heights, and these inputs are pictures; fill them by --fill-from"};
   }
-  if (!repair.options_.fill_from) return repair;
-  Result<std::shared_ptr<const BaseRaster>> base = BaseRaster::create(*repair.options_.fill_from, options, kind, plan);
-  if (!base) return base.error();
-  repair.base_ = std::move(*base);
+  if (repair.options_.fill_from) {
+    Result<std::shared_ptr<const BaseRaster>> base = BaseRaster::create(*repair.options_.fill_from, options, kind, plan);
+    if (!base) return base.error();
+    repair.base_ = std::move(*base);
+  }
+  if (repair.options_.coast) {
+    Result<std::shared_ptr<const Coast>> coast = Coast::create(*repair.options_.coast, plan.crs);
+    if (!coast) return coast.error();
+    repair.coast_ = std::move(*coast);
+  }
   return repair;
 }
 
@@ -29,11 +35,11 @@ int RepairPlan::margin() const { return (base_ ? kBaseFillReach : 0) + (options_
 
 std::string RepairPlan::description() const {
   if (!options_.any()) return "";
-  return fmt::format("|repair 1|voids {}|base {}", options_.fill_voids, base_ ? base_->revision() : "");
+  return fmt::format("|repair 1|voids {}|base {}|coast {} {}", options_.fill_voids, base_ ? base_->revision() : "", coast_ ? coast_->revision : "", options_.sea_beyond);
 }
 
 std::size_t RepairPlan::bytes(const OutputPlan& plan) const {
-  if (!options_.any()) return 0;
+  if (!options_.fills()) return 0;
   constexpr std::size_t kPatchBytes = 80;  // of a void's pixel while it is filled
   const std::size_t window_bytes = base_ ? 48 : 16;
   const auto add_margins = [&](int pixels) { return static_cast<std::size_t>(pixels + 2 * margin() + grid()); };

@@ -7,6 +7,7 @@
 
 #include "base/result.h"
 #include "prepare/gdal/base_raster.h"
+#include "prepare/gdal/coast.h"
 #include "prepare/ingest.h"
 #include "prepare/plan.h"
 
@@ -19,6 +20,7 @@ class RepairPlan {
 
   const RepairOptions& options() const { return options_; }
   const BaseRaster* base() const { return base_.get(); }
+  const std::shared_ptr<const Coast>& coast() const { return coast_; }
   /// Where windows with a margin begin: at multiples of it.
   int grid() const;
   /// How far from a pixel lies what it may depend on, in pixels.
@@ -27,10 +29,13 @@ class RepairPlan {
   std::string description() const;
   /// What a worker needs for it at most.
   std::size_t bytes(const OutputPlan& plan) const;
+  /// What all workers share.
+  std::size_t shared_bytes() const { return coast_ ? coast_->shore.bytes() : 0; }
 
  private:
   RepairOptions options_;
   std::shared_ptr<const BaseRaster> base_;
+  std::shared_ptr<const Coast> coast_;
 };
 
 }  // namespace tellurion::prepare

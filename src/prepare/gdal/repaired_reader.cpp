@@ -19,16 +19,31 @@ bool has_voids(const Plane& plane) {
 Result<RepairedReader> RepairedReader::create(const Mosaic& mosaic) {
   Result<GDALDatasetUniquePtr> dataset = mosaic.open();
   if (!dataset) return dataset.error();
-  if (mosaic.repair().base() == nullptr) return RepairedReader(mosaic, std::move(dataset).value(), nullptr);
-  Result<GDALDatasetUniquePtr> base = mosaic.repair().base()->open();
-  if (!base) return base.error();
-  return RepairedReader(mosaic, std::move(dataset).value(), std::move(base).value());
+  RepairedReader reader(mosaic, std::move(dataset).value());
+  const RepairPlan& repair = mosaic.repair();
+  if (repair.base() != nullptr) {
+    Result<GDALDatasetUniquePtr> base = repair.base()->open();
+    if (!base) return base.error();
+    reader.base_ = std::move(base).value();
+  }
+  if (repair.coast()) {
+    Result<SeaCutter> sea = SeaCutter::create(repair.coast(), mosaic.plan(), repair.options().sea_beyond);
+    if (!sea) return sea.error();
+    reader.sea_.emplace(std::move(*sea));
+  }
+  return reader;
 }
 
 Result<Samples> RepairedReader::read(int x, int y, int width, int height) {
-  Result<Samples> samples = read_mosaic({x, y, width, height});
-  if (!samples || !repair_->options().any() || !has_voids(plane_of(plan_->layout, *samples, 0))) return samples;
-  const PixelBox box = with_margin({x, y, width, height}), inner{x - box.x, y - box.y, width, height};
+  Result<Samples> samples = read_filled({x, y, width, height});
+  if (samples && sea_) sea_->cut({x, y, width, height}, *samples);
+  return samples;
+}
+
+Result<Samples> RepairedReader::read_filled(const PixelBox& wanted) {
+  Result<Samples> samples = read_mosaic(wanted);
+  if (!samples || !repair_->options().fills() || !has_voids(plane_of(plan_->layout, *samples, 0))) return samples;
+  const PixelBox box = with_margin(wanted), inner{wanted.x - box.x, wanted.y - box.y, wanted.width, wanted.height};
   samples = read_mosaic(box);
   if (!samples) return samples;
   if (base_) {
@@ -39,7 +54,7 @@ Result<Samples> RepairedReader::read(int x, int y, int width, int height) {
     fill_voids(heights, inner, repair_->options().fill_voids);
     fill_band(plan_->layout, *samples, 0, heights);
   }
-  return cut_window(plan_->layout, *samples, inner.x, inner.y, width, height);
+  return cut_window(plan_->layout, *samples, inner.x, inner.y, inner.width, inner.height);
 }
 
 Result<Samples> RepairedReader::read_mosaic(const PixelBox& box) { return read_window(*dataset_, plan_->layout, box.x, box.y, box.width, box.height); }

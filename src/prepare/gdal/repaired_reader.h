@@ -2,6 +2,8 @@
 // One object for each thread.
 #pragma once
 
+#include <optional>
+
 #include <gdal_priv.h>
 
 #include "base/result.h"
@@ -18,9 +20,9 @@ class RepairedReader {
   Result<Samples> read(int x, int y, int width, int height);
 
  private:
-  RepairedReader(const Mosaic& mosaic, GDALDatasetUniquePtr dataset, GDALDatasetUniquePtr base)
-      : plan_(&mosaic.plan()), repair_(&mosaic.repair()), dataset_(std::move(dataset)), base_(std::move(base)) {}
+  RepairedReader(const Mosaic& mosaic, GDALDatasetUniquePtr dataset) : plan_(&mosaic.plan()), repair_(&mosaic.repair()), dataset_(std::move(dataset)) {}
 
+  Result<Samples> read_filled(const PixelBox& box);
   Result<Samples> read_mosaic(const PixelBox& box);
   /// The box and the margin around it.
   PixelBox with_margin(const PixelBox& box) const;
@@ -30,6 +32,7 @@ class RepairedReader {
   const RepairPlan* repair_;
   GDALDatasetUniquePtr dataset_;
   GDALDatasetUniquePtr base_;
+  std::optional<SeaCutter> sea_;
 };
 
 }  // namespace tellurion::prepare
