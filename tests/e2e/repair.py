@@ -7,9 +7,9 @@ import subprocess
 import unittest
 
 import numpy as np
-from osgeo import gdal
+from osgeo import gdal, ogr, osr
 
-from _common import BLUE_MARBLE, EVEREST, PROGRAM, RAINIER, Case, shared
+from _common import ARCTIC, BLUE_MARBLE, ETOPO5, EVEREST, PROGRAM, RAINIER, Case, shared
 
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
 VOID = -32768
@@ -260,6 +260,109 @@ class BaseOfHeights(RepairCase):
         raster = gdal.Open(str(file))
         t = raster.GetGeoTransform()
         return (t[0], t[3] + raster.RasterYSize * t[5], t[0] + raster.RasterXSize * t[1], t[3])
+
+
+def on_ellipsoid(latitude, longitude):
+    """Metres from the centre of WGS 84; degrees in."""
+    a, e2 = 6378137.0, 0.0066943799901413165
+    latitude, longitude = np.radians(latitude), np.radians(longitude)
+    n = a / np.sqrt(1 - e2 * np.sin(latitude) ** 2)
+    return np.stack([n * np.cos(latitude) * np.cos(longitude), n * np.cos(latitude) * np.sin(longitude), n * (1 - e2) * np.sin(latitude)], axis=-1)
+
+
+class Sea(RepairCase):
+    """Land from the real mask of water, as polygons. That a pixel goes is held against its distance from all points of the coast."""
+
+    MASK = "earth/imagery/water_mask_1600.png"
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        mask = gdal.Open(str(shared(cls.MASK)))
+        cls.land = mask.GetRasterBand(1).ReadAsArray() < 128
+        raster = gdal.GetDriverByName("MEM").Create("", *cls.land.shape[::-1], 1)
+        raster.SetGeoTransform(mask.GetGeoTransform())
+        raster.SetProjection(mask.GetProjection())
+        raster.WriteArray(cls.land.astype(np.uint8))
+        cls.coast = cls.folder / "land.gpkg"
+        vector = ogr.GetDriverByName("GPKG").CreateDataSource(str(cls.coast))
+        layer = vector.CreateLayer("land", mask.GetSpatialRef(), ogr.wkbPolygon)
+        gdal.Polygonize(raster.GetRasterBand(1), raster.GetRasterBand(1), layer, -1)
+        t = mask.GetGeoTransform()
+        # The coast is where neighbours differ: points along these edges of pixels, eight for each.
+        rows, columns = np.nonzero(cls.land[1:] != cls.land[:-1])
+        share = (np.arange(8) + 0.5) / 8
+        flat = np.stack([np.repeat(t[3] + t[5] * (rows + 1), 8), (t[0] + t[1] * (columns[:, None] + share)).ravel()], axis=1)
+        rows, columns = np.nonzero(cls.land[:, 1:] != cls.land[:, :-1])
+        upright = np.stack([(t[3] + t[5] * (rows[:, None] + share)).ravel(), np.repeat(t[0] + t[1] * (columns + 1), 8)], axis=1)
+        cls.points = on_ellipsoid(*np.concatenate([flat, upright]).T)
+
+    def check(self, kept, latitude, longitude, metres, tolerance):
+        """`kept` of pixels at places, which are few."""
+        t = gdal.Open(str(shared(self.MASK))).GetGeoTransform()
+        on_land = self.land[((latitude - t[3]) / t[5]).astype(int).clip(0, self.land.shape[0] - 1), ((longitude - t[0]) / t[1]).astype(int).clip(0, self.land.shape[1] - 1)]
+        places = on_ellipsoid(latitude, longitude)
+        chord = np.array([np.sqrt(((self.points - place) ** 2).sum(axis=1).min()) for place in places])
+        way = 2 * 6371e3 * np.arcsin(chord / (2 * 6371e3))
+        sure = (np.abs(way - metres) > tolerance) | on_land
+        self.assertGreater(sure.mean(), 0.9)
+        self.assertGreater((~kept[sure]).sum(), 100)
+        np.testing.assert_array_equal(kept[sure], (on_land | (way < metres))[sure])
+        return int(sure.sum())
+
+    def test_pictures_are_transparent_beyond_the_distance(self):
+        out = self.same_however_made(shared(BLUE_MARBLE), "--coast", self.coast, "--sea-beyond", 200e3, "--compress", "deflate")
+        bands = read(out)
+        random = np.random.default_rng(5)
+        rows, columns = random.integers(0, 2048, 1500), random.integers(0, 4096, 1500)
+        compared = self.check(bands[3][rows, columns] == 255, 90 - (rows + 0.5) * 180 / 2048, (columns + 0.5) * 360 / 4096 - 180, 200e3, 3e3)
+        np.testing.assert_array_equal(bands[:3][:, bands[3] == 255], read(shared(BLUE_MARBLE))[:, bands[3] == 255])
+        print(f"{compared} pixels are cut or kept as their distances say; {(bands[3] == 0).mean():.1%} of all are cut")
+
+    def test_heights_are_void_and_distances_those_on_the_body_in_any_projection(self):
+        for source, crs in ((ARCTIC, "EPSG:3995"), (ETOPO5, "EPSG:3395")):
+            with self.subTest(crs):
+                extra = [] if crs == "EPSG:3995" else ["--crs", crs, "--resolution", 20000]
+                if extra:
+                    source = self.folder / "middle.tif"
+                    gdal.Translate(str(source), str(shared(ETOPO5)), projWin=[-170, 70, 170, -70])
+                heights, _ = self.ingest(source if extra else shared(source), *extra, "--coast", self.coast, "--sea-beyond", 150e3, out=f"{crs[5:]}.tif")
+                raster = gdal.Open(str(heights))
+                data, t = raster.ReadAsArray(), raster.GetGeoTransform()
+                void = raster.GetRasterBand(1).GetNoDataValue()
+                random = np.random.default_rng(6)
+                rows, columns = random.integers(0, data.shape[0], 800), random.integers(0, data.shape[1], 800)
+                to_degrees = osr.CoordinateTransformation(raster.GetSpatialRef(), self.degrees())
+                places = np.array(to_degrees.TransformPoints(np.stack([t[0] + t[1] * (columns + 0.5), t[3] + t[5] * (rows + 0.5)], axis=1)))
+                whole, _ = self.ingest(source if extra else shared(source), *extra, out=f"whole-{crs[5:]}.tif")
+                there = read(whole)[rows, columns] != void
+                self.check((data[rows, columns] != void)[there], places[there, 1], places[there, 0], 150e3, 5e3)
+
+    @staticmethod
+    def degrees():
+        crs = osr.SpatialReference()
+        crs.ImportFromEPSG(4326)
+        crs.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+        return crs
+
+    def test_a_coast_is_part_of_the_plan(self):
+        small = self.folder / "small.tif"
+        gdal.Translate(str(small), str(shared(BLUE_MARBLE)), width=600, height=300)
+        options = [small, "--coast", self.coast, "--sea-beyond"]
+        self.ingest(*options, 1e5, out="planned.tif")
+        self.assertIn("up to date", self.ingest(*options, 1e5, out="planned.tif")[1].stdout)
+        self.assertIn("1 of 1 chunks made", self.ingest(*options, 2e5, out="planned.tif")[1].stdout)
+
+    def test_bad_coasts_are_named(self):
+        text = self.folder / "text.txt"
+        text.write_text("no polygons")
+        lost = self.folder / "lost.csv"
+        lost.write_text('WKT\n"POLYGON ((0 0, 0 9, 9 9, 0 0))"\n')
+        for coast in (text, lost, self.folder / "nothing.shp", shared(RAINIER), shared("earth/archives/cities.gpkg")):
+            with self.subTest(str(coast)):
+                self.refused(shared(RAINIER), "--coast", coast, "--sea-beyond", 1000, naming=coast)
+        self.refused(shared(RAINIER), "--coast", self.coast, naming="--sea-beyond", status=WRONG_USAGE)
+        self.refused(shared(RAINIER), "--sea-beyond", 1000, naming="--coast", status=WRONG_USAGE)
 
 
 if __name__ == "__main__":
