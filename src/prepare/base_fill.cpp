@@ -17,7 +17,8 @@ constexpr double kLeastVariance = 1.0;     ///< of the base, in its samples' uni
 constexpr double kLeastGain = 0.5, kMostGain = 2.0;
 
 static_assert(kBaseFillGrid == 1 << kCoarsestFit);
-static_assert(kBaseFillReach >= (1 << (kCoarsestFit + 1)) - (1 << kFinestFit) + (1 << kCoarsestFit) + (1 << (kCoarsestDifference + 1)) - 2 + (1 << kCoarsestDifference));
+static_assert(fitted_base_reach(0) == (1 << (kCoarsestFit + 1)) - (1 << kFinestFit) + (1 << kCoarsestFit));
+static_assert(kBaseFillReach >= fitted_base_reach(0) + (1 << (kCoarsestDifference + 1)) - 2 + (1 << kCoarsestDifference));
 
 /// Values in cells, row by row.
 template <class T>
@@ -126,9 +127,9 @@ Fit fit_between(const Grid<Fit>& fits, const Between& column, const Between& row
 }
 
 /// In cells of 16 pixels.
-Grid<Fit> fit_cells(const Plane& window, const Plane& base) {
+Grid<Fit> fit_cells(const Plane& window, const Plane& base, int coarsest) {
   std::vector<Grid<Sums>> levels{sum_cells(window, base)};
-  for (int level = kFinestFit; level < kCoarsestFit; ++level) levels.push_back(coarser(levels.back()));
+  for (int level = kFinestFit; level < coarsest; ++level) levels.push_back(coarser(levels.back()));
   Grid<Fit> fits(1, 1);
   while (!levels.empty()) {
     const Grid<Sums>& sums = levels.back();
@@ -200,9 +201,13 @@ Grid<Known> spread(Grid<Known> differences, int level) {
 
 }  // namespace
 
-Plane fill_from_base(const Plane& window, const Plane& base) {
+Plane fitted_base(const Plane& window, const Plane& base, int finer) {
   assert(window.width == base.width && window.height == base.height);
-  Plane filling = fitted(base, fit_cells(window, base));
+  return fitted(base, fit_cells(window, base, kCoarsestFit - finer));
+}
+
+Plane fill_from_base(const Plane& window, const Plane& base) {
+  Plane filling = fitted_base(window, base, 0);
   Grid<Known> differences(window.width, window.height);
   for (std::size_t i = 0; i < window.values.size(); ++i) {
     const float difference = window.values[i] - filling.values[i];

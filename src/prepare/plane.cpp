@@ -72,6 +72,17 @@ void fill_band(const SampleLayout& layout, Samples& samples, int band, const Pla
   });
 }
 
+void replace_in_band(const SampleLayout& layout, Samples& samples, int band, const Plane& plane, const std::vector<std::uint8_t>& pixels) {
+  with_type(layout.type, [&](auto type) {
+    using T = decltype(type);
+    const Voids<T> voids(layout);
+    T* sample = as<T>(samples) + band;
+    for (std::size_t i = 0; i < pixels.size(); ++i, sample += layout.bands) {
+      if (pixels[i] != 0 && !std::isnan(plane.values[i])) *sample = sample_of(static_cast<double>(plane.values[i]), voids);
+    }
+  });
+}
+
 void make_opaque(const SampleLayout& layout, Samples& samples, const Plane& plane) {
   with_type(layout.type, [&](auto type) {
     using T = decltype(type);

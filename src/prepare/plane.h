@@ -2,6 +2,7 @@
 // Thread-safe as values are.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "prepare/samples.h"
@@ -27,6 +28,9 @@ Plane plane_of(const SampleLayout& layout, const Samples& samples, int band);
 /// Puts what is not void of `plane` into the band in place of the voids there; rounded half up and within the range of the type.
 /// Where there is alpha, pixels that are partly transparent are laid over the plane; make_opaque has to follow.
 void fill_band(const SampleLayout& layout, Samples& samples, int band, const Plane& plane);
+
+/// Puts what is not void of `plane` into the band where `pixels`, row by row, is not 0; as fill_band.
+void replace_in_band(const SampleLayout& layout, Samples& samples, int band, const Plane& plane, const std::vector<std::uint8_t>& pixels);
 
 /// Makes pixels opaque where `plane` is not void.
 void make_opaque(const SampleLayout& layout, Samples& samples, const Plane& plane);

@@ -17,7 +17,7 @@ VOID = -32768
 
 def copy_with(file, source, bands):
     """The raster `source` with other samples."""
-    raster = gdal.GetDriverByName("GTiff").CreateCopy(str(file), gdal.Open(str(source)), options=["TILED=YES", "BLOCKXSIZE=256", "BLOCKYSIZE=256"])
+    raster = gdal.GetDriverByName("GTiff").CreateCopy(str(file), source if isinstance(source, gdal.Dataset) else gdal.Open(str(source)), options=["TILED=YES", "BLOCKXSIZE=256", "BLOCKYSIZE=256"])
     raster.WriteArray(bands)
     raster = None
     return file
@@ -39,7 +39,7 @@ class RepairCase(Case):
     def same_however_made(self, *arguments):
         """Workers, shards and the bound of memory change no byte. Gives the file."""
         out, _ = self.ingest(*arguments, "--workers", 2, out="two.tif")
-        one, _ = self.ingest(*arguments, "--workers", 1, "--memory", 512, out="one.tif")
+        one, _ = self.ingest(*arguments, "--workers", 1, "--memory", 768, out="one.tif")
         self.assertEqual(out.read_bytes(), one.read_bytes())
         for shard in (2, 1):
             self.ingest(*arguments, "--shard", f"{shard}/2", out="shards.tif")
@@ -363,6 +363,42 @@ class Sea(RepairCase):
                 self.refused(shared(RAINIER), "--coast", coast, "--sea-beyond", 1000, naming=coast)
         self.refused(shared(RAINIER), "--coast", self.coast, naming="--sea-beyond", status=WRONG_USAGE)
         self.refused(shared(RAINIER), "--sea-beyond", 1000, naming="--coast", status=WRONG_USAGE)
+
+
+class Clouds(RepairCase):
+    """Real clouds, the thicker ones, painted over Blue Marble between 50 degrees south and north; the base is of another month and half as fine."""
+
+    BASE = "earth/imagery/bmng_200405_2048.jpg"
+    WINDOW = [1500, 460, 2300, 1120]  # columns and rows of Blue Marble
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        left, top, width, height = cls.WINDOW
+        picture = gdal.Translate("", str(shared(BLUE_MARBLE)), format="MEM", srcWin=cls.WINDOW)
+        cls.truth = picture.ReadAsArray()
+        clouds = gdal.Translate("", str(shared("earth/imagery/clouds_4096.png")), format="MEM", rgbExpand="rgba", srcWin=cls.WINDOW).ReadAsArray()[3] / 255
+        cls.opacity = np.where(clouds > 0.4, (clouds - 0.4) / 0.6, 0)
+        cls.painted = np.floor(cls.truth * (1 - cls.opacity) + 255 * cls.opacity + 0.5).astype(np.uint8)
+        cls.source = copy_with(cls.folder / "cloudy.tif", picture, cls.painted)
+
+    def test_clouds_go_and_the_ground_stays(self):
+        cleared = read(self.same_however_made(self.source, "--fill-from", shared(self.BASE), "--clouds", 30, "--compress", "deflate"))
+        cloud, clear = self.opacity > 0.15, self.opacity == 0
+        error = lambda bands, where: float(np.abs(bands.astype(int) - self.truth)[:, where].mean())
+        found = np.any(cleared != self.painted, axis=0)[cloud].mean()
+        print(f"clouds on {cloud.mean():.1%}, of which {found:.2%} found; mean difference from the truth under them {error(self.painted, cloud):.1f} before and {error(cleared, cloud):.1f} after, "
+              f"beside them 0 and {error(cleared, clear):.2f}; of the whole {error(self.painted, cloud | ~cloud):.2f} and {error(cleared, cloud | ~cloud):.2f}")
+        self.assertGreater(found, 0.99)
+        self.assertLess(error(cleared, cloud), 0.05 * error(self.painted, cloud))
+        self.assertLess(error(cleared, clear), 1.0)
+
+    def test_memory_stays_within_its_bound(self):
+        self.stays_within(700, self.source, "--fill-from", shared(self.BASE), "--clouds", 30)
+
+    def test_clouds_need_a_base_and_a_picture(self):
+        self.refused(self.source, "--clouds", 30, naming="--fill-from", status=WRONG_USAGE)
+        self.refused(shared(RAINIER), "--fill-from", shared(RAINIER), "--clouds", 30, naming="--clouds")
 
 
 if __name__ == "__main__":

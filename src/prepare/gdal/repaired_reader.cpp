@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "prepare/base_fill.h"
+#include "prepare/clouds.h"
 #include "prepare/plane.h"
 
 namespace tellurion::prepare {
@@ -42,7 +42,7 @@ Result<Samples> RepairedReader::read(int x, int y, int width, int height) {
 
 Result<Samples> RepairedReader::read_filled(const PixelBox& wanted) {
   Result<Samples> samples = read_mosaic(wanted);
-  if (!samples || !repair_->options().fills() || !has_voids(plane_of(plan_->layout, *samples, 0))) return samples;
+  if (!samples || !repair_->options().fills() || (!repair_->options().clouds && !has_voids(plane_of(plan_->layout, *samples, 0)))) return samples;
   const PixelBox box = with_margin(wanted), inner{wanted.x - box.x, wanted.y - box.y, wanted.width, wanted.height};
   samples = read_mosaic(box);
   if (!samples) return samples;
@@ -65,15 +65,31 @@ PixelBox RepairedReader::with_margin(const PixelBox& box) const {
   return {left, top, std::min(box.x + box.width + margin, plan_->width) - left, std::min(box.y + box.height + margin, plan_->height) - top};
 }
 
+std::vector<std::uint8_t> RepairedReader::clouds_in(const Samples& samples, const Samples& base) const {
+  const SampleLayout& layout = repair_->base()->layout();
+  std::vector<Plane> ours, its;
+  for (int band = 0; band < layout.bands - (layout.alpha ? 1 : 0); ++band) {
+    ours.push_back(plane_of(plan_->layout, samples, band));
+    its.push_back(plane_of(layout, base, band));
+  }
+  return find_clouds(ours, its, static_cast<float>(*repair_->options().clouds));
+}
+
 Result<void> RepairedReader::fill_from_base(const PixelBox& box, Samples& samples) {
   const SampleLayout& layout = repair_->base()->layout();
   const Result<Samples> base = read_window(*base_, layout, box.x, box.y, box.width, box.height);
   if (!base) return base.error();
   const int colours = layout.bands - (layout.alpha ? 1 : 0);
+  const std::vector<std::uint8_t> clouds = repair_->options().clouds ? clouds_in(samples, *base) : std::vector<std::uint8_t>{};
   Plane filling;
   for (int band = 0; band < colours; ++band) {
-    filling = prepare::fill_from_base(plane_of(plan_->layout, samples, band), plane_of(layout, *base, band));
+    Plane clear = plane_of(plan_->layout, samples, band);
+    for (std::size_t i = 0; i < clouds.size(); ++i) {
+      if (clouds[i] != 0) clear.values[i] = std::nanf("");
+    }
+    filling = prepare::fill_from_base(clear, plane_of(layout, *base, band));
     fill_band(plan_->layout, samples, band, filling);
+    replace_in_band(plan_->layout, samples, band, filling, clouds);
   }
   if (plan_->layout.alpha) make_opaque(plan_->layout, samples, filling);
   return {};

@@ -26,6 +26,7 @@ class RepairedReader {
   Result<Samples> read_mosaic(const PixelBox& box);
   /// The box and the margin around it.
   PixelBox with_margin(const PixelBox& box) const;
+  std::vector<std::uint8_t> clouds_in(const Samples& samples, const Samples& base) const;
   Result<void> fill_from_base(const PixelBox& box, Samples& samples);
 
   const OutputPlan* plan_;
