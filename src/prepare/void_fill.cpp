@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 namespace tellurion::prepare {
@@ -31,21 +32,25 @@ struct Patch {
 struct Void {
   std::vector<std::pair<int, int>> pixels;
   int left = 0, top = 0, right = 0, bottom = 0;  ///< the last two are within
-
-  bool fits(int most) const { return right - left < most && bottom - top < most; }
 };
 
-/// The void around a pixel; takes its pixels off `open`.
-Void take_void(int x, int y, int width, int height, std::vector<std::uint8_t>& open) {
+/// What is known of a pixel while voids are looked for.
+enum class Mark : std::uint8_t { none, open, too_large };
+
+/// The void around a pixel; nothing if it is more than `most` wide or high, which stays marked. Of others the marks go.
+std::optional<Void> take_void(int x, int y, int width, int height, int most, std::vector<Mark>& marks) {
   Void found{{}, x, y, x, y};
+  bool fits = true;
+  const auto mark_of = [&](int i, int j) -> Mark& { return marks[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]; };
   const auto take = [&](int i, int j) {
-    std::uint8_t& flag = open[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)];
-    if (flag == 0) return;
-    flag = 0;
+    Mark& mark = mark_of(i, j);
+    if (mark == Mark::too_large) fits = false;
+    if (mark != Mark::open) return;
+    mark = Mark::none;
     found.pixels.emplace_back(i, j);
   };
   take(x, y);
-  for (std::size_t next = 0; next < found.pixels.size(); ++next) {
+  for (std::size_t next = 0; next < found.pixels.size() && fits; ++next) {
     const auto [i, j] = found.pixels[next];
     found.left = std::min(found.left, i);
     found.right = std::max(found.right, i);
@@ -54,8 +59,11 @@ Void take_void(int x, int y, int width, int height, std::vector<std::uint8_t>& o
     for (int b = std::max(j - 1, 0); b <= std::min(j + 1, height - 1); ++b) {
       for (int a = std::max(i - 1, 0); a <= std::min(i + 1, width - 1); ++a) take(a, b);
     }
+    fits = fits && found.right - found.left < most && found.bottom - found.top < most;
   }
-  return found;
+  if (fits) return found;
+  for (const auto& [i, j] : found.pixels) mark_of(i, j) = Mark::too_large;
+  return std::nullopt;
 }
 
 /// Four times the difference of each cell from its neighbours' mean, free at the edges.
@@ -209,18 +217,15 @@ void fill(const Plane& window, const Void& found, Plane& filled) {
 }  // namespace
 
 void fill_voids(Plane& window, const PixelBox& wanted, int most_pixels) {
-  std::vector<std::uint8_t> open(window.values.size());
-  std::transform(window.values.begin(), window.values.end(), open.begin(), [](float value) { return static_cast<std::uint8_t>(std::isnan(value)); });
-  std::vector<Void> voids;
+  std::vector<Mark> marks(window.values.size());
+  std::transform(window.values.begin(), window.values.end(), marks.begin(), [](float value) { return std::isnan(value) ? Mark::open : Mark::none; });
+  const Plane before = window;
   for (int y = wanted.y; y < wanted.y + wanted.height; ++y) {
     for (int x = wanted.x; x < wanted.x + wanted.width; ++x) {
-      if (open[static_cast<std::size_t>(y) * static_cast<std::size_t>(window.width) + static_cast<std::size_t>(x)] == 0) continue;
-      Void found = take_void(x, y, window.width, window.height, open);
-      if (found.fits(most_pixels)) voids.push_back(std::move(found));
+      if (marks[static_cast<std::size_t>(y) * static_cast<std::size_t>(window.width) + static_cast<std::size_t>(x)] != Mark::open) continue;
+      if (const std::optional<Void> found = take_void(x, y, window.width, window.height, most_pixels, marks)) fill(before, *found, window);
     }
   }
-  const Plane before = window;
-  for (const Void& found : voids) fill(before, found, window);
 }
 
 }  // namespace tellurion::prepare
