@@ -1,6 +1,7 @@
 #include "prepare/shore.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 
@@ -41,13 +42,16 @@ double square_to_box(const glm::dvec3& from, const glm::dvec3& least, const glm:
 
 }  // namespace
 
-Shore::Shore(const geo::Ellipsoid& body, const std::vector<Ring>& rings) : body_(body), bands_(kBands) {
-  for (const Ring& ring : rings) {
-    for (std::size_t i = 0; i < ring.size(); ++i) {
-      const geo::LatLon &a = ring[i], &b = ring[(i + 1) % ring.size()];
-      add_edge({a.latitude.value, a.longitude.value, b.latitude.value, b.longitude.value});
+Shore::Shore(const geo::Ellipsoid& body, const std::vector<Land>& lands) : body_(body), bands_(kBands) {
+  assert(lands.size() <= kMostLands);
+  for (std::size_t land = 0; land < lands.size(); ++land) {
+    for (const Ring& ring : lands[land]) {
+      for (std::size_t i = 0; i < ring.size(); ++i) {
+        const geo::LatLon &a = ring[i], &b = ring[(i + 1) % ring.size()];
+        add_edge({a.latitude.value, a.longitude.value, b.latitude.value, b.longitude.value, std::uint64_t{1} << land});
+      }
+      add_coast(ring);
     }
-    add_coast(ring);
   }
   if (!leaves_.empty()) root_ = build(leaves_, 0, leaves_.size());
   leaves_ = {};
@@ -135,18 +139,18 @@ double Shore::nearest(std::uint32_t index, const glm::dvec3& from, double best) 
 
 bool Shore::is_land(const geo::LatLon& place) const {
   const double latitude = place.latitude.value, longitude = std::remainder(place.longitude.value, 2.0 * kPi);
-  const auto crossings_east_of = [&](double from) {
-    int count = 0;
+  const auto odd_crossings_east_of = [&](double from) {
+    std::uint64_t odd = 0;
     for (const std::uint32_t index : bands_[band_of(latitude)]) {
       const Edge& edge = edges_[index];
       if ((edge.from_latitude > latitude) == (edge.to_latitude > latitude)) continue;
       const double share = (latitude - edge.from_latitude) / (edge.to_latitude - edge.from_latitude);
-      if (edge.from_longitude + share * (edge.to_longitude - edge.from_longitude) > from) ++count;
+      if (edge.from_longitude + share * (edge.to_longitude - edge.from_longitude) > from) odd ^= edge.land;
     }
-    return count;
+    return odd;
   };
   for (const double turn : {0.0, 2.0 * kPi, -2.0 * kPi}) {  // rings may go past the 180th meridian
-    if (crossings_east_of(longitude + turn) % 2 == 1) return true;
+    if (odd_crossings_east_of(longitude + turn) != 0) return true;
   }
   return false;
 }

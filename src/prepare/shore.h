@@ -13,10 +13,15 @@ namespace tellurion::prepare {
 /// A closed line without its first point again, straight in latitude and longitude.
 using Ring = std::vector<geo::LatLon>;
 
+/// Land is what lies within an odd number of rings: lakes are holes, and islands in them land again.
+using Land = std::vector<Ring>;
+
 class Shore {
  public:
-  /// Land is what lies within an odd number of `rings`. Edges on the 180th meridian or a pole cut land and are no coast.
-  Shore(const geo::Ellipsoid& body, const std::vector<Ring>& rings);
+  static constexpr std::size_t kMostLands = 64;
+
+  /// All of `lands`, at most kMostLands, together. Edges on the 180th meridian or a pole cut land and are no coast.
+  Shore(const geo::Ellipsoid& body, const std::vector<Land>& lands);
 
   /// Metres to the coast through the body; `most` if it is farther.
   double distance(const geo::Point<geo::Ecef>& from, double most) const;
@@ -28,6 +33,7 @@ class Shore {
  private:
   struct Edge {
     double from_latitude, from_longitude, to_latitude, to_longitude;  ///< radians
+    std::uint64_t land;  ///< a bit for each
   };
   struct Box {
     glm::dvec3 least, most;

@@ -37,33 +37,36 @@ geo::Point<geo::Ecef> point(const geo::LatLon& place) { return geo::surface_poin
 }  // namespace
 
 TEST_CASE("Shore: land is within, islands in lakes too, and past the 180th meridian") {
-  const Shore shore(kBall, {ring_of({{0, 0}, {0, 30}, {30, 30}, {30, 0}}), ring_of({{10, 10}, {10, 20}, {20, 20}, {20, 10}}), ring_of({{14, 14}, {14, 16}, {16, 16}, {16, 14}}),
-                            ring_of({{-20, 170}, {-20, 190}, {-10, 190}, {-10, 170}})});
+  const Shore shore(kBall, {{ring_of({{0, 0}, {0, 30}, {30, 30}, {30, 0}}), ring_of({{10, 10}, {10, 20}, {20, 20}, {20, 10}}), ring_of({{14, 14}, {14, 16}, {16, 16}, {16, 14}}),
+                            ring_of({{-20, 170}, {-20, 190}, {-10, 190}, {-10, 170}})},
+                            {ring_of({{-15, 178}, {-15, 200}, {-14, 200}, {-14, 178}})}});
   CHECK(shore.is_land(at(5, 5)));
   CHECK_FALSE(shore.is_land(at(12, 12)));
   CHECK(shore.is_land(at(15, 15)));
   CHECK_FALSE(shore.is_land(at(5, -5)));
   CHECK(shore.is_land(at(-15, 179)));
   CHECK(shore.is_land(at(-15, -175)));
-  CHECK_FALSE(shore.is_land(at(-15, -165)));
+  CHECK_FALSE(shore.is_land(at(-15, -155)));
+  CHECK(shore.is_land(at(-14.5, 179)));  // of two lands
+  CHECK(shore.is_land(at(-14.5, -165)));  // of the second alone
 }
 
 TEST_CASE("Shore: distances are those to the nearest point of the coast") {
-  const Shore shore(kBall, {ring_of({{-1, -1}, {-1, 1}, {1, 1}, {1, -1}})});
+  const Shore shore(kBall, {{ring_of({{-1, -1}, {-1, 1}, {1, 1}, {1, -1}})}});
   CHECK(shore.distance(point(at(0, 3)), 1e7) == doctest::Approx(2.0 * kBall.a() * std::sin(kDegree)).epsilon(1e-5));
   CHECK(shore.distance(point(at(0, 0.5)), 1e7) == doctest::Approx(2.0 * kBall.a() * std::sin(0.25 * kDegree)).epsilon(1e-4));
   CHECK(shore.distance(point(at(0, 90)), 1000.0) == 1000.0);
 }
 
 TEST_CASE("Shore: where maps end there is no coast") {
-  const Shore shore(kBall, {ring_of({{-90, -180}, {-70, -180}, {-70, 180}, {-90, 180}})});
+  const Shore shore(kBall, {{ring_of({{-90, -180}, {-70, -180}, {-70, 180}, {-90, 180}})}});
   CHECK(shore.distance(point(at(-80, 180)), 1e7) > 1e6);
   CHECK(shore.is_land(at(-89, 179.9)));
 }
 
 TEST_CASE("open_sea: every pixel as its own distance says, poles and date line too") {
-  const std::vector<Ring> rings{ring_of({{60, -10}, {60, 10}, {85, 10}, {85, -10}}), ring_of({{-5, 175}, {-5, 185}, {5, 185}, {5, 175}}), ring_of({{-90, -180}, {-75, -180}, {-75, 180}, {-90, 180}})};
-  const Shore shore(kBall, rings);
+  const Land land{ring_of({{60, -10}, {60, 10}, {85, 10}, {85, -10}}), ring_of({{-5, 175}, {-5, 185}, {5, 185}, {5, 175}}), ring_of({{-90, -180}, {-75, -180}, {-75, 180}, {-90, 180}})};
+  const Shore shore(kBall, {land});
   std::vector<geo::LatLon> coast;
   for (int i = 0; i <= 2000; ++i) {
     const double share = i / 2000.0;
@@ -94,7 +97,7 @@ TEST_CASE("open_sea: every pixel as its own distance says, poles and date line t
 }
 
 TEST_CASE("open_sea: parts of a raster give what the whole gives, and pixels that lie nowhere stay") {
-  const Shore shore(kBall, {ring_of({{10, 10}, {12, 40}, {30, 35}, {25, 5}})});
+  const Shore shore(kBall, {{ring_of({{10, 10}, {12, 40}, {30, 35}, {25, 5}})}});
   const PlaceOfPixel whole = whole_body(2.0);
   const PlaceOfPixel place = [&](double x, double y) { return x < 20.0 ? std::nullopt : whole(x, y); };
   const auto found = open_sea(shore, place, {0, 0, 720, 360}, 300e3);

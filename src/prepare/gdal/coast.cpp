@@ -46,7 +46,7 @@ OGRSpatialReference crs_of(const OutputPlan& plan) {
 /// Reads rings of polygons and turns them to latitude and longitude.
 class RingReader {
  public:
-  RingReader(OGRCoordinateTransformation* transformation, double radians, std::vector<Ring>& rings) : transformation_(transformation), radians_(radians), rings_(rings) {}
+  RingReader(OGRCoordinateTransformation* transformation, double radians, Land& land) : transformation_(transformation), radians_(radians), land_(land) {}
 
   /// False if a point of it has no place.
   bool add(const OGRGeometry& geometry) {
@@ -73,24 +73,24 @@ class RingReader {
       y[static_cast<std::size_t>(i)] = ring.getY(i);
     }
     if (!transformation_->Transform(count, x.data(), y.data())) return false;
-    Ring& added = rings_.emplace_back();
+    Ring& added = land_.emplace_back();
     for (std::size_t i = 0; i < x.size(); ++i) added.push_back({Radians(y[i] * radians_), Radians(x[i] * radians_)});
     return true;
   }
 
   OGRCoordinateTransformation* transformation_;
   double radians_;
-  std::vector<Ring>& rings_;
+  Land& land_;
 };
 
-Result<void> add_layer(const std::string& path, OGRLayer& layer, const Geographic& to, std::vector<Ring>& rings) {
+Result<void> add_layer(const std::string& path, OGRLayer& layer, const Geographic& to, Land& land) {
   const source::QuietErrors quiet;
   if (layer.GetSpatialRef() == nullptr) return {ErrorCode::unsupported, fmt::format("{}: says no coordinate system; give it one: ogr2ogr -a_srs EPSG:4326 OUT.gpkg IN", path)};
   OGRSpatialReference from = *layer.GetSpatialRef();
   from.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   OGRCoordinateTransformation* transformation = OGRCreateCoordinateTransformation(&from, &to.crs);
   if (transformation == nullptr) return {ErrorCode::unsupported, fmt::format("{}: its coordinate system does not go into the output's: {}", path, quiet.last())};
-  RingReader reader(transformation, to.radians, rings);
+  RingReader reader(transformation, to.radians, land);
   bool good = true;
   for (const auto& feature : layer) {
     const OGRGeometry* geometry = feature->GetGeometryRef();
@@ -103,9 +103,7 @@ Result<void> add_layer(const std::string& path, OGRLayer& layer, const Geographi
   return {};
 }
 
-}  // namespace
-
-Result<std::shared_ptr<const Coast>> Coast::create(const std::string& path, const std::string& crs) {
+Result<Land> read_land(const std::string& path, const Geographic& to, std::string& revision) {
   const source::QuietErrors quiet;
   const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
   if (!dataset) {
@@ -113,15 +111,30 @@ Result<std::shared_ptr<const Coast>> Coast::create(const std::string& path, cons
     if (!std::filesystem::exists(path, error)) return {ErrorCode::not_found, fmt::format("{}: is not there", path)};
     return {ErrorCode::unsupported, fmt::format("{}: is no file of polygons that GDAL opens; a coast is one of land, as Shapefile, GeoPackage or GeoJSON (of GSHHG: GSHHS_shp, level L1)", path)};
   }
+  Land land;
+  for (OGRLayer* layer : dataset->GetLayers()) {
+    if (Result<void> added = add_layer(path, *layer, to, land); !added) return added.error();
+  }
+  if (land.empty()) return {ErrorCode::unsupported, fmt::format("{}: holds no polygons; a coast is a file of polygons of land", path)};
+  revision += "|" + revision_of(*dataset, path);
+  return land;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Coast>> Coast::create(const std::vector<std::string>& paths, const std::string& crs) {
+  if (paths.size() > Shore::kMostLands) return {ErrorCode::invalid_argument, fmt::format("--coast takes up to {} files; put some together: ogrmerge.py -single -o OUT.gpkg IN...", Shore::kMostLands)};
   OGRSpatialReference output;
   output.importFromWkt(crs.c_str());
   const Geographic geographic = geographic_of(output);
-  std::vector<Ring> rings;
-  for (OGRLayer* layer : dataset->GetLayers()) {
-    if (Result<void> added = add_layer(path, *layer, geographic, rings); !added) return added.error();
+  std::string revision;
+  std::vector<Land> lands;
+  for (const std::string& path : paths) {
+    Result<Land> land = read_land(path, geographic, revision);
+    if (!land) return land.error();
+    lands.push_back(std::move(*land));
   }
-  if (rings.empty()) return {ErrorCode::unsupported, fmt::format("{}: holds no polygons; a coast is a file of polygons of land", path)};
-  return std::make_shared<const Coast>(Coast{revision_of(*dataset, path), Shore(geographic.body, rings)});
+  return std::make_shared<const Coast>(Coast{revision, Shore(geographic.body, lands)});
 }
 
 Result<SeaCutter> SeaCutter::create(std::shared_ptr<const Coast> coast, const OutputPlan& plan, double metres) {

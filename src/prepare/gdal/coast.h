@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <ogr_spatialref.h>
 
@@ -12,13 +13,14 @@
 
 namespace tellurion::prepare {
 
-/// Land out of a file of polygons.
+/// Land out of files of polygons.
 struct Coast {
   std::string revision;  ///< what it depends on
   Shore shore;
 
-  /// All polygons that GDAL finds in `path`, for rasters in `crs`. Errors: not_found, unsupported; both name the file and what to do.
-  static Result<std::shared_ptr<const Coast>> create(const std::string& path, const std::string& crs);
+  /// All polygons that GDAL finds in `paths`, for rasters in `crs`; a file is a land.
+  /// Errors: not_found, unsupported; both name the file and what to do.
+  static Result<std::shared_ptr<const Coast>> create(const std::vector<std::string>& paths, const std::string& crs);
 };
 
 /// Cuts the sea out of samples. One object for each thread.

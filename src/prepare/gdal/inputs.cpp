@@ -238,7 +238,7 @@ Result<void> choose_samples(const std::vector<Input>& inputs, const IngestOption
   }
   if (!sample_type(type)) return unsupported(first, "and the other inputs have no common type of samples; bring them to one first: gdal_translate -ot");
   layout.type = *sample_type(type);
-  const bool has_voids = options.repair.coast || !cover_all(inputs, plan);
+  const bool has_voids = !options.repair.coasts.empty() || !cover_all(inputs, plan);
   if (first.kind == IngestKind::height) {
     choose_height_samples(inputs, has_voids, plan);
   } else {

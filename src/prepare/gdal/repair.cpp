@@ -23,8 +23,8 @@ Result<RepairPlan> RepairPlan::create(const IngestOptions& options, IngestKind k
     if (!base) return base.error();
     repair.base_ = std::move(*base);
   }
-  if (repair.options_.coast) {
-    Result<std::shared_ptr<const Coast>> coast = Coast::create(*repair.options_.coast, plan.crs);
+  if (!repair.options_.coasts.empty()) {
+    Result<std::shared_ptr<const Coast>> coast = Coast::create(repair.options_.coasts, plan.crs);
     if (!coast) return coast.error();
     repair.coast_ = std::move(*coast);
   }
