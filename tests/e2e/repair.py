@@ -4,6 +4,7 @@
 import pathlib
 import re
 import subprocess
+import time
 import unittest
 
 import numpy as np
@@ -37,10 +38,15 @@ class RepairCase(Case):
         self.assertIn(str(naming), done.stderr.strip().splitlines()[-1])
 
     def same_however_made(self, *arguments):
-        """Workers, shards and the bound of memory change no byte. Gives the file."""
+        """Workers, shards, a kill and the bound of memory change no byte. Gives the file."""
         out, _ = self.ingest(*arguments, "--workers", 2, out="two.tif")
         one, _ = self.ingest(*arguments, "--workers", 1, "--memory", 768, out="one.tif")
         self.assertEqual(out.read_bytes(), one.read_bytes())
+        program = subprocess.Popen([PROGRAM, "ingest", *map(str, arguments), "--out", str(self.folder / "killed.tif"), "--workers", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(1.0)
+        program.kill()
+        program.wait()
+        self.assertEqual(out.read_bytes(), self.ingest(*arguments, out="killed.tif")[0].read_bytes())
         for shard in (2, 1):
             self.ingest(*arguments, "--shard", f"{shard}/2", out="shards.tif")
         self.tellurion("ingest", "merge", "--out", self.folder / "shards.tif")
