@@ -85,7 +85,7 @@ Grid<Sums> sum_cells(const Plane& window, const Plane& base) {
     for (int x = 0; x < window.width; ++x) {
       if (std::isnan(base.at(x, y))) continue;
       Sums& cell = sums.at(x / kSide, y / kSide);
-      const double b = static_cast<double>(base.at(x, y)), sample = static_cast<double>(window.at(x, y));
+      const auto b = static_cast<double>(base.at(x, y)), sample = static_cast<double>(window.at(x, y));
       cell.base_count += 1.0;
       cell.base += b;
       cell.base_squared += b * b;

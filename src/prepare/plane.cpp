@@ -17,10 +17,10 @@ constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 template <class T>
 T sample_of(double value, const Voids<T>& voids) {
   if constexpr (std::is_floating_point_v<T>) {
-    const T sample = static_cast<T>(value);
+    const auto sample = static_cast<T>(value);
     return voids.contains(sample) ? std::nextafter(sample, std::numeric_limits<T>::max()) : sample;
   } else {
-    const double least = static_cast<double>(std::numeric_limits<T>::lowest()), most = static_cast<double>(std::numeric_limits<T>::max());
+    const auto least = static_cast<double>(std::numeric_limits<T>::lowest()), most = static_cast<double>(std::numeric_limits<T>::max());
     const T sample = static_cast<T>(std::clamp(std::floor(value + 0.5), least, most));
     if (!voids.contains(sample)) return sample;
     return static_cast<T>(sample == std::numeric_limits<T>::max() ? sample - 1 : sample + 1);

@@ -1,8 +1,9 @@
 #include "prepare/base_fill.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <random>
 
 #include <doctest/doctest.h>
@@ -44,7 +45,7 @@ Plane cut(const Plane& plane, int x, int y, int width, int height) {
   return part;
 }
 
-bool same(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
 
 }  // namespace
 

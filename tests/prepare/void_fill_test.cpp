@@ -1,7 +1,8 @@
 #include "prepare/void_fill.h"
 
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <random>
 
 #include <doctest/doctest.h>
@@ -36,7 +37,7 @@ Plane cut(const Plane& plane, const PixelBox& box) {
 
 PixelBox all_of(const Plane& plane) { return {0, 0, plane.width, plane.height}; }
 
-bool same(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
 
 }  // namespace
 

@@ -47,7 +47,7 @@ std::size_t RepairPlan::bytes(const OutputPlan& plan) const {
   constexpr std::size_t kPatchBytes = 100;  // of a void's pixel while it is filled
   const auto bands = static_cast<std::size_t>(plan.layout.bands);
   const std::size_t window_bytes = options_.clouds ? 16 + 12 * bands : base_ ? 32 : 16;  // as numbers
-  const auto add_margins = [&](int pixels) { return static_cast<std::size_t>(pixels + 2 * margin() + grid()); };
+  const auto add_margins = [&](int pixels) { return static_cast<std::size_t>(pixels) + 2 * static_cast<std::size_t>(margin()) + static_cast<std::size_t>(grid()); };
   const std::size_t window = add_margins(std::min(plan.chunk_width, plan.width)) * add_margins(std::min(plan.block, plan.height));
   const auto side = static_cast<std::size_t>(options_.fill_voids);
   return window * (3 * plan.layout.pixel_bytes() + window_bytes) + side * side * kPatchBytes;
