@@ -138,6 +138,18 @@ void add_format_options(CLI::App& command, prepare::IngestOptions& options) {
   command.add_option_function<std::string>("--block", [&options](const std::string& t) { options.block = one_of("--block", t, {"256", "512"}) == "256" ? 256 : 512; }, "side of blocks in pixels (512)")->type_name("256|512");
 }
 
+void add_repair_options(CLI::App& command, prepare::RepairOptions& repair) {
+  command.add_option("--fill-voids", repair.fill_voids, "fill voids of heights that are at most so many pixels wide and high")->check(CLI::Range(1, 1024))->type_name("PIXELS");
+  CLI::Option* base = command.add_option_function<std::string>("--fill-from", [&repair](const std::string& t) { repair.fill_from = t; }, "take what is missing from this raster, fitted to its surroundings in colour or height");
+  base->type_name("FILE");
+  command.add_option_function<double>("--clouds", [&repair](const double& b) { repair.clouds = b; }, "take what all colours show brighter than --fill-from by more than this (30, say) from there too")
+      ->check(in_range(1.0, 65535.0))->needs(base)->type_name("BRIGHTER");
+  CLI::Option* coast = command.add_option_function<std::string>("--coast", [&repair](const std::string& t) { repair.coasts.push_back(t); }, "a file of polygons of land (Shapefile, GeoPackage, GeoJSON); may be repeated");
+  CLI::Option* beyond = command.add_option("--sea-beyond", repair.sea_beyond, "cut away the sea that is farther than this off the coast")->check(in_range(0.0, 2e7));
+  coast->needs(beyond)->trigger_on_parse()->type_name("FILE");
+  beyond->needs(coast)->type_name("METRES");
+}
+
 }  // namespace
 
 void add_ingest(CLI::App& app, Run& run) {
@@ -153,6 +165,7 @@ void add_ingest(CLI::App& app, Run& run) {
   command->add_option("INPUT", options.inputs, "rasters that GDAL opens, and folders of them")->type_name("");
   command->add_option("--out", options.out, "the GeoTIFF to write; FILE.tif.work keeps what is done")->check(has_ending(".tif"))->type_name("FILE.tif");
   add_format_options(*command, options);
+  add_repair_options(*command, options.repair);
   command->add_option("--workers", options.workers, "threads (all cores)")->check(CLI::Range(1, 256))->type_name("N");
   command->add_option_function<std::size_t>("--memory", [&options](const std::size_t& mb) { options.memory_bytes = mb << 20; }, "bound of the memory used (1024)")
       ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 20))->type_name("MB");

@@ -17,6 +17,18 @@ namespace tellurion::prepare {
 
 enum class IngestKind { height, picture };
 
+/// What is mended in what the inputs hold.
+struct RepairOptions {
+  int fill_voids = 0;                      ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
+  std::optional<std::string> fill_from{};  ///< a raster that covers all; what is missing comes from it, fitted to its surroundings
+  std::optional<double> clouds{};          ///< what all colours show brighter than `fill_from` by more than this, in samples, is cloud and comes from there too
+  std::vector<std::string> coasts{};       ///< up to 64 files of polygons of land, off which the sea is cut away beyond `sea_beyond`
+  double sea_beyond = 0.0;                 ///< metres over ground
+
+  bool fills() const { return fill_voids > 0 || fill_from; }
+  bool any() const { return fills() || !coasts.empty(); }
+};
+
 struct IngestOptions {
   std::vector<std::string> inputs;       ///< what GDAL opens, or folders of it; where two overlap the finer one is on top, else the later one
   std::filesystem::path out;
@@ -27,6 +39,7 @@ struct IngestOptions {
   std::optional<double> no_data{};       ///< of the inputs, over what they say
   std::string resampling = "bilinear";   ///< where grids differ, in GDAL's words
   std::optional<std::string> compress{}; ///< in GDAL's words; nothing: DEFLATE, for pictures JPEG, or WEBP with alpha
+  RepairOptions repair{};
   int level = 6;
   int quality = 85;
   int block = 512;

@@ -342,6 +342,8 @@ class Guide(IngestCase):
         write_raster(folder / "dem/a.tif", hills(600, 600))
         write_raster(folder / "dem/b.tif", hills(600, 600), transform=(16, 0.01, 0, 50, 0, -0.01))
         write_raster(folder / "picture.tif", np.random.default_rng(1).integers(0, 256, (3, 600, 600)).astype(np.uint8))
+        write_raster(folder / "base.tif", np.random.default_rng(2).integers(0, 256, (3, 300, 300)).astype(np.uint8), transform=(9, 0.03, 0, 51, 0, -0.03))
+        (folder / "land.geojson").write_text('{"type": "Polygon", "coordinates": [[[11, 45], [12, 45], [12, 49], [11, 49], [11, 45]]]}')
         for command in commands:
             with self.subTest(command):
                 subprocess.run(["bash", "-ec", f'tellurion() {{ "{PROGRAM}" "$@"; }}; {command}'], cwd=folder, check=True, capture_output=True)

@@ -10,17 +10,18 @@
 
 namespace tellurion::prepare {
 
-std::size_t worker_bytes(const OutputPlan& plan) {
+std::size_t worker_bytes(const OutputPlan& plan, const RepairPlan& repair) {
   constexpr std::size_t kStrips = 7;  // what is read, GDAL's working copies, and the halves of all levels
   constexpr std::size_t kBlocks = 6;  // as samples, in GDAL's file in memory, compressed
   const auto block = static_cast<std::size_t>(plan.block), pixel = plan.layout.pixel_bytes();
-  return kStrips * static_cast<std::size_t>(plan.chunk_width) * block * pixel + kBlocks * block * block * pixel + (std::size_t{4} << 20);
+  return kStrips * static_cast<std::size_t>(plan.chunk_width) * block * pixel + kBlocks * block * block * pixel + (std::size_t{4} << 20) +
+         repair.bytes(plan);
 }
 
 Result<ChunkWorker> ChunkWorker::create(const Mosaic& mosaic, std::filesystem::path folder) {
-  Result<GDALDatasetUniquePtr> dataset = mosaic.open();
-  if (!dataset) return dataset.error();
-  return ChunkWorker(mosaic.plan(), std::move(dataset).value(), std::move(folder));
+  Result<RepairedReader> reader = RepairedReader::create(mosaic);
+  if (!reader) return reader.error();
+  return ChunkWorker(mosaic.plan(), std::move(*reader), std::move(folder));
 }
 
 Result<void> ChunkWorker::make(int index) {
@@ -51,7 +52,7 @@ Result<void> ChunkWorker::make(int index) {
   };
   PyramidStream pyramid(plan.layout, chunk.width, chunk.height, plan.block, last_level, take);
   for (int y = 0; y < chunk.height; y += plan.block) {
-    Result<Samples> strip = read_window(*dataset_, plan.layout, chunk.x, chunk.y + y, chunk.width, std::min(plan.block, chunk.height - y));
+    Result<Samples> strip = reader_.read(chunk.x, chunk.y + y, chunk.width, std::min(plan.block, chunk.height - y));
     if (!strip) return strip.error();
     const std::vector<BandStatistics> more = statistics(plan.layout, *strip);
     for (std::size_t band = 0; band < found.size(); ++band) found[band].add(more[band]);

@@ -4,16 +4,15 @@
 
 #include <filesystem>
 
-#include <gdal_priv.h>
-
 #include "base/result.h"
 #include "prepare/gdal/inputs.h"
+#include "prepare/gdal/repaired_reader.h"
 #include "prepare/plan.h"
 
 namespace tellurion::prepare {
 
 /// What a worker needs at most, in bytes, beside GDAL's block cache.
-std::size_t worker_bytes(const OutputPlan& plan);
+std::size_t worker_bytes(const OutputPlan& plan, const RepairPlan& repair);
 
 class ChunkWorker {
  public:
@@ -23,11 +22,10 @@ class ChunkWorker {
   Result<void> make(int index);
 
  private:
-  ChunkWorker(const OutputPlan& plan, GDALDatasetUniquePtr dataset, std::filesystem::path folder)
-      : plan_(&plan), dataset_(std::move(dataset)), folder_(std::move(folder)) {}
+  ChunkWorker(const OutputPlan& plan, RepairedReader reader, std::filesystem::path folder) : plan_(&plan), reader_(std::move(reader)), folder_(std::move(folder)) {}
 
   const OutputPlan* plan_;
-  GDALDatasetUniquePtr dataset_;
+  RepairedReader reader_;
   std::filesystem::path folder_;
 };
 

@@ -100,14 +100,14 @@ IngestReport report_of(const OutputPlan& plan) {
 }
 
 /// How many workers the memory is enough for. Errors: exhausted.
-Result<int> affordable_workers(const OutputPlan& plan, const IngestOptions& options) {
-  const std::size_t one = worker_bytes(plan), least = kProgramBytes + kLeastCacheBytes + one;
+Result<int> affordable_workers(const Mosaic& mosaic, const IngestOptions& options) {
+  const std::size_t one = worker_bytes(mosaic.plan(), mosaic.repair()), shared = mosaic.repair().shared_bytes(), least = kProgramBytes + shared + kLeastCacheBytes + one;
   if (options.memory_bytes < least) {
     return {ErrorCode::exhausted, fmt::format("this needs more memory than {} MB; say --memory {} or more, or --block 256", options.memory_bytes >> 20, (least >> 20) + 1)};
   }
-  const std::size_t cache = std::max(kLeastCacheBytes, options.memory_bytes / 8);
+  const std::size_t cache = std::clamp(options.memory_bytes / 8, kLeastCacheBytes, kLeastCacheBytes + options.memory_bytes - least);
   source::configure_gdal(cache);
-  return std::max(1, static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.workers), (options.memory_bytes - kProgramBytes - cache) / one)));
+  return std::max(1, static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.workers), (options.memory_bytes - kProgramBytes - shared - cache) / one)));
 }
 
 /// The chunks of the shard that are not done. A damaged one is not.
@@ -168,7 +168,7 @@ Result<IngestReport> ingest(const IngestOptions& options, const IngestWatch& wat
     report.file_bytes = fs::file_size(options.out, error);
     return report;
   }
-  const Result<int> workers = affordable_workers(plan, options);
+  const Result<int> workers = affordable_workers(*mosaic, options);
   if (!workers) return workers.error();
   fs::create_directories(folder, error);
   if (error) return {ErrorCode::unavailable, fmt::format("{} cannot be made: {}; is there a folder, and is it writable?", folder.string(), error.message())};

@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <set>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -14,14 +11,13 @@
 #include <cpl_string.h>
 #include <cpl_vsi.h>
 #include <fmt/format.h>
-#include <gdal_alg.h>
-#include <gdal_utils.h>
 #include <ogr_spatialref.h>
 
 #include "base/hash.h"
 #include "prepare/gdal/gdal_types.h"
+#include "prepare/gdal/input.h"
+#include "prepare/gdal/memory_files.h"
 #include "source/gdal/gdal_runtime.h"
-#include "source/undeclared_voids.h"
 
 namespace tellurion::prepare {
 namespace {
@@ -29,61 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPixelTolerance = 1e-3;  ///< pixels: grids that differ by less are the same
-constexpr double kWarpTolerance = 0.01;   ///< pixels of an input: GDAL's 0.125 are ten metres on a mountain of pixels of 90
-constexpr double kOwnVoid = -32768.0;     ///< where voids need a value and no input names one
 
-/// A rectangle in pixels of the output.
-struct Rectangle {
-  double x = 0.0, y = 0.0, width = 0.0, height = 0.0;
-};
-
-struct Input {
-  std::string path;
-  std::string source;         ///< what is read in its place: itself, or a virtual raster of it
-  int columns = 0;
-  int rows = 0;
-  int block_x = 0;
-  int block_y = 0;
-  bool point_samples = false;
-  OGRSpatialReference crs;
-  std::array<double, 6> transform{};
-  IngestKind kind = IngestKind::height;
-  SampleType type = SampleType::f32;
-  std::vector<BandAbout> bands;
-  std::optional<double> no_data;
-  int colours = 0;            ///< bands without alpha
-  int alpha_band = 0;         ///< 0: none
-  bool has_mask = false;      ///< beside the bands, for all of them
-  double scale_to_byte = 1.0; ///< of pictures of fewer than 8 bits
-  bool north_up = true;
-  std::string revision;
-  bool warped = false;
-  double fineness = 1.0;      ///< output pixels for one of its own, where it is warped
-  Rectangle place;            ///< on the output's grid
-};
-
-/// Names of files in GDAL's memory, unlinked at the end.
-class MemoryFiles {
- public:
-  MemoryFiles() = default;
-  ~MemoryFiles() {
-    for (const std::string& name : names_) VSIUnlink(name.c_str());
-  }
-  MemoryFiles(const MemoryFiles&) = delete;
-  MemoryFiles& operator=(const MemoryFiles&) = delete;
-
-  std::string add() {
-    static std::atomic<std::uint64_t> count{0};
-    return names_.emplace_back(fmt::format("/vsimem/tellurion-ingest-{}.vrt", ++count));
-  }
-
- private:
-  std::vector<std::string> names_;
-};
-
-Error unsupported(const Input& input, const std::string& what) { return {ErrorCode::unsupported, fmt::format("{}: {}", input.path, what)}; }
-
-// --- Each input ------------------------------------------------------------------------------------------------------
+// --- The inputs ------------------------------------------------------------------------------------------------------
 
 Result<OGRSpatialReference> crs_from(const std::string& text, const char* option) {
   OGRSpatialReference crs;
@@ -92,142 +35,6 @@ Result<OGRSpatialReference> crs_from(const std::string& text, const char* option
   }
   crs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   return crs;
-}
-
-/// Names, sizes and times of all files that a data set is made of.
-std::string revision_of(GDALDataset& dataset, const std::string& path) {
-  std::string text = path;
-  char** files = dataset.GetFileList();
-  for (int i = 0; i < CSLCount(files); ++i) {
-    std::error_code error;
-    const auto size = fs::file_size(files[i], error);
-    if (error) continue;
-    const auto time = fs::last_write_time(files[i], error);
-    text += fmt::format("|{} {} {}", files[i], size, time.time_since_epoch().count());
-  }
-  CSLDestroy(files);
-  return text;
-}
-
-IngestKind guess_kind(GDALDataset& dataset) {
-  GDALRasterBand* band = dataset.GetRasterBand(1);
-  if (band->GetColorTable() != nullptr || dataset.GetRasterCount() >= 3) return IngestKind::picture;
-  const std::string_view unit = band->GetUnitType();
-  if (unit == "m" || unit == "metre" || unit == "meter" || unit == "ft") return IngestKind::height;
-  const GDALDataType type = band->GetRasterDataType();
-  return type == GDT_Byte || type == GDT_UInt16 ? IngestKind::picture : IngestKind::height;
-}
-
-int find_alpha(GDALDataset& dataset) {
-  for (int i = 1; i <= dataset.GetRasterCount(); ++i) {
-    if (dataset.GetRasterBand(i)->GetColorInterpretation() == GCI_AlphaBand) return i;
-  }
-  return 0;
-}
-
-/// A palette's picture as one of red, green, blue and, if it has transparent colours, alpha.
-Result<void> expand_palette(Input& input, GDALDatasetUniquePtr& dataset, MemoryFiles& files) {
-  const GDALColorTable* table = dataset->GetRasterBand(1)->GetColorTable();
-  bool transparent = false;
-  for (int i = 0; i < table->GetColorEntryCount(); ++i) transparent = transparent || table->GetColorEntry(i)->c4 < 255;
-  CPLStringList arguments;
-  for (const char* one : {"-of", "VRT", "-b", "1", "-expand", transparent ? "rgba" : "rgb"}) arguments.AddString(one);
-  GDALTranslateOptions* options = GDALTranslateOptionsNew(arguments.List(), nullptr);
-  const std::string name = files.add();
-  int wrong = 0;
-  const source::QuietErrors quiet;
-  GDALDatasetUniquePtr expanded(GDALDataset::FromHandle(GDALTranslate(name.c_str(), GDALDataset::ToHandle(dataset.get()), options, &wrong)));
-  GDALTranslateOptionsFree(options);
-  if (!expanded) return unsupported(input, fmt::format("its colour table cannot be used: {}", quiet.last()));
-  expanded.reset();  // before what it was made from
-  Result<GDALDatasetUniquePtr> opened = source::open_dataset(name);
-  if (!opened) return opened.error();
-  dataset = std::move(opened).value();
-  input.source = name;
-  input.no_data.reset();
-  return {};
-}
-
-Result<void> inspect_bands(Input& input, GDALDatasetUniquePtr& dataset, const IngestOptions& options, MemoryFiles& files) {
-  const int count = dataset->GetRasterCount();
-  if (count == 0) {
-    char** parts = dataset->GetMetadata("SUBDATASETS");
-    const char* first = CSLFetchNameValue(parts, "SUBDATASET_1_NAME");
-    return unsupported(input, first != nullptr ? fmt::format("holds several rasters; name one of them as input, for example {}", first) : "holds no raster band");
-  }
-  GDALRasterBand* band = dataset->GetRasterBand(1);
-  input.kind = options.kind.value_or(guess_kind(*dataset));
-  int has_no_data = 0;
-  const double declared = band->GetNoDataValue(&has_no_data);
-  if (has_no_data) input.no_data = declared;
-  if (options.no_data) input.no_data = options.no_data;
-  if (input.kind == IngestKind::picture && band->GetColorTable() != nullptr) {
-    if (Result<void> expanded = expand_palette(input, dataset, files); !expanded) return expanded;
-    band = dataset->GetRasterBand(1);
-  }
-  GDALDataType type = GDT_Byte;
-  for (int i = 1; i <= dataset->GetRasterCount(); ++i) {
-    GDALRasterBand* one = dataset->GetRasterBand(i);
-    const GDALDataType its = one->GetRasterDataType();
-    if (GDALDataTypeIsComplex(its)) return unsupported(input, fmt::format("has complex samples ({}); make them real first: gdal_calc.py", GDALGetDataTypeName(its)));
-    if (!sample_type(its)) return unsupported(input, fmt::format("has samples of type {}; make them smaller first: gdal_translate -ot Float64 IN OUT.tif", GDALGetDataTypeName(its)));
-    if (one->GetColorInterpretation() == GCI_CyanBand) return unsupported(input, "is a picture of printing colours (CMYK); make it one of red, green and blue first");
-    type = i == 1 ? its : GDALDataTypeUnion(type, its);
-    input.bands.push_back({GDALGetColorInterpretationName(one->GetColorInterpretation()), one->GetDescription(), one->GetUnitType(), one->GetScale(), one->GetOffset()});
-  }
-  if (input.kind == IngestKind::height && dataset->GetRasterCount() != 1) {
-    return unsupported(input, fmt::format("has {} bands, and heights are one; choose it: gdal_translate -b 1 IN OUT.tif", dataset->GetRasterCount()));
-  }
-  if (!sample_type(type)) return unsupported(input, "has bands of types that go into no common one; give them one: gdal_translate -ot Float64 IN OUT.tif");
-  input.type = *sample_type(type);
-  band->GetBlockSize(&input.block_x, &input.block_y);
-  const char* signedness = band->GetMetadataItem("PIXELTYPE", "IMAGE_STRUCTURE");
-  if (signedness != nullptr && EQUAL(signedness, "SIGNEDBYTE")) return unsupported(input, "has signed samples of 8 bits; widen them first: gdal_translate -ot Int16 IN OUT.tif");
-  if (input.kind == IngestKind::height) {
-    input.colours = 1;
-    if (!input.no_data && input.type == SampleType::i16) input.no_data = kOwnVoid;
-    return {};
-  }
-  input.alpha_band = find_alpha(*dataset);
-  input.colours = dataset->GetRasterCount() - (input.alpha_band > 0 ? 1 : 0);
-  if (input.colours == 0) return unsupported(input, "holds nothing but alpha");
-  if (input.alpha_band > 0 && input.alpha_band != dataset->GetRasterCount()) return unsupported(input, "has its alpha before other bands; put it last: gdal_translate -b");
-  input.has_mask = input.alpha_band == 0 && !input.no_data && (band->GetMaskFlags() & GMF_PER_DATASET) != 0;
-  const char* bits = band->GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
-  if (bits != nullptr && input.type == SampleType::u8 && std::atoi(bits) < 8 && std::atoi(bits) > 0) input.scale_to_byte = 255.0 / ((1 << std::atoi(bits)) - 1);
-  return {};
-}
-
-Result<Input> inspect(const std::string& path, const IngestOptions& options, MemoryFiles& files) {
-  Result<GDALDatasetUniquePtr> opened = source::open_dataset(path);
-  if (!opened) return opened.error();
-  GDALDatasetUniquePtr dataset = std::move(opened).value();
-  const source::QuietErrors quiet;
-  Input input;
-  input.path = path;
-  input.source = path;
-  input.columns = dataset->GetRasterXSize();
-  input.rows = dataset->GetRasterYSize();
-  const char* point = dataset->GetMetadataItem(GDALMD_AREA_OR_POINT);
-  input.point_samples = point != nullptr && EQUAL(point, GDALMD_AOP_POINT);
-  input.revision = revision_of(*dataset, path);
-  if (dataset->GetRasterCount() > 0 && dataset->GetGeoTransform(input.transform.data()) != CE_None) {
-    const bool points = dataset->GetGCPCount() > 0 || dataset->GetMetadata("RPC") != nullptr;
-    return unsupported(input, points ? "is placed by control points only; straighten it first: gdalwarp -t_srs EPSG:4326 IN OUT.tif"
-                                     : "says nowhere where it lies; give it a place: gdal_translate -a_srs EPSG:4326 -a_ullr WEST NORTH EAST SOUTH IN OUT.tif");
-  }
-  if (Result<void> bands = inspect_bands(input, dataset, options, files); !bands) return bands.error();
-  const OGRSpatialReference* crs = dataset->GetSpatialRef();
-  if (crs == nullptr || crs->IsEmpty() || crs->IsLocal()) {
-    return unsupported(input, "says no coordinate system; give it one: gdal_translate -a_srs EPSG:... IN OUT.tif");
-  }
-  input.crs = *crs;
-  input.crs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
-  const auto& t = input.transform;
-  const double determinant = t[1] * t[5] - t[2] * t[4];
-  if (!std::isfinite(t[0]) || !std::isfinite(t[3]) || !std::isfinite(determinant) || determinant == 0.0) return unsupported(input, "its geotransform makes no sense; give it another: gdal_translate -a_ullr");
-  input.north_up = t[2] == 0.0 && t[4] == 0.0 && t[1] > 0.0 && t[5] < 0.0;
-  return input;
 }
 
 /// Files and, of folders, the rasters in them, by name.
@@ -318,33 +125,6 @@ bool same_crs(const OGRSpatialReference& a, const OGRSpatialReference& b) {
   return a.IsSame(&b, kRelaxed.data()) != 0;
 }
 
-struct Extent {
-  double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
-  double pixel_x = 0.0, pixel_y = 0.0;
-};
-
-/// Where an input lies in the output's CRS, and how fine it is there.
-Result<Extent> extent_in(const Input& input, const std::string& crs) {
-  const auto& t = input.transform;
-  if (!input.warped) return Extent{t[0], t[3] + input.rows * t[5], t[0] + input.columns * t[1], t[3], t[1], -t[5]};
-  const Result<GDALDatasetUniquePtr> dataset = source::open_dataset(input.source);
-  if (!dataset) return dataset.error();
-  const source::QuietErrors quiet;
-  const std::string own = source::wkt_of(input.crs);
-  CPLStringList names;
-  names.SetNameValue("SRC_SRS", own.c_str());
-  names.SetNameValue("DST_SRS", crs.c_str());
-  void* transformer = GDALCreateGenImgProjTransformer2(GDALDataset::ToHandle(dataset.value().get()), nullptr, names.List());
-  std::array<double, 6> found{};
-  std::array<double, 4> bounds{};
-  int width = 0, height = 0;
-  const bool good = transformer != nullptr && GDALSuggestedWarpOutput2(GDALDataset::ToHandle(dataset.value().get()), GDALGenImgProjTransform, transformer, found.data(), &width, &height,
-                                                                       bounds.data(), 0) == CE_None;
-  if (transformer != nullptr) GDALDestroyGenImgProjTransformer(transformer);
-  if (!good) return unsupported(input, fmt::format("does not go into the output's coordinate system: {}; choose another by --crs", quiet.last()));
-  return Extent{found[0], found[3] + height * found[5], found[0] + width * found[1], found[3], found[1], -found[5]};
-}
-
 /// Chooses resolution, extent and size; says of every input where it lies.
 Result<void> choose_grid(const IngestOptions& options, std::vector<Input>& inputs, OutputPlan& plan, const std::string& crs) {
   std::vector<Extent> extents;
@@ -429,19 +209,19 @@ bool holds(SampleType type, double value) {
   return false;
 }
 
-void choose_height_samples(const std::vector<Input>& inputs, OutputPlan& plan) {
+void choose_height_samples(const std::vector<Input>& inputs, bool has_voids, OutputPlan& plan) {
   SampleLayout& layout = plan.layout;
   for (const Input& input : inputs) {
     if (!layout.no_data && input.no_data && holds(layout.type, *input.no_data)) layout.no_data = input.no_data;
   }
-  if (layout.no_data || cover_all(inputs, plan)) return;
+  if (layout.no_data || !has_voids) return;
   if (layout.type == SampleType::u8) layout.type = SampleType::i16;
   if (layout.type == SampleType::u16) layout.type = SampleType::i32;
   if (layout.type == SampleType::u32) layout.type = SampleType::f64;
   layout.no_data = kOwnVoid;
 }
 
-Result<void> choose_samples(const std::vector<Input>& inputs, OutputPlan& plan) {
+Result<void> choose_samples(const std::vector<Input>& inputs, const IngestOptions& options, OutputPlan& plan) {
   const Input& first = inputs.front();
   SampleLayout& layout = plan.layout;
   GDALDataType type = gdal_type(first.type);
@@ -458,11 +238,12 @@ Result<void> choose_samples(const std::vector<Input>& inputs, OutputPlan& plan) 
   }
   if (!sample_type(type)) return unsupported(first, "and the other inputs have no common type of samples; bring them to one first: gdal_translate -ot");
   layout.type = *sample_type(type);
+  const bool has_voids = !options.repair.coasts.empty() || !cover_all(inputs, plan);
   if (first.kind == IngestKind::height) {
-    choose_height_samples(inputs, plan);
+    choose_height_samples(inputs, has_voids, plan);
   } else {
     if (inputs.size() > 1 && first.type != layout.type) return unsupported(first, "and other pictures have samples of different depth; bring them to one first: gdal_translate -ot Byte -scale");
-    layout.alpha = transparent || !cover_all(inputs, plan);
+    layout.alpha = transparent || has_voids;
   }
   layout.bands = first.colours + (layout.alpha ? 1 : 0);
   for (int i = 1; i <= layout.bands; ++i) {
@@ -508,59 +289,6 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-/// An input in another grid as one of the output's, computed while it is read.
-Result<void> warp(Input& input, const IngestOptions& options, const OutputPlan& plan, MemoryFiles& files) {
-  const auto& t = plan.transform;
-  const Rectangle& place = input.place;
-  const double west = t[0] + place.x * t[1], north = t[3] + place.y * t[5];
-  const bool picture = input.kind == IngestKind::picture;
-  CPLStringList arguments;
-  const auto add = [&](const char* name, auto... values) {
-    arguments.AddString(name);
-    (arguments.AddString(fmt::format("{}", values).c_str()), ...);
-  };
-  add("-of", "VRT");
-  add("-s_srs", source::wkt_of(input.crs));
-  add("-t_srs", plan.crs);
-  add("-te", west, north + place.height * t[5], west + place.width * t[1], north);
-  add("-ts", place.width, place.height);
-  add("-r", options.resampling);
-  if (picture) {
-    if (input.alpha_band == 0) add("-dstalpha");
-    if (input.no_data) add("-srcnodata", *input.no_data);
-    add("-wo", "UNIFIED_SRC_NODATA=YES");
-  } else {
-    if (input.no_data) add("-srcnodata", *input.no_data);
-    add("-dstnodata", plan.layout.no_data.value_or(kOwnVoid));
-    add("-ot", GDALGetDataTypeName(gdal_type(plan.layout.type)));
-  }
-  add("-et", kWarpTolerance);
-  add("-wm", 16);
-  // Else GDAL finds the size of its kernel anew for every piece that it reads, which shows at their borders.
-  add("-wo", fmt::format("XSCALE={}", input.fineness));
-  add("-wo", fmt::format("YSCALE={}", input.fineness));
-  const source::QuietErrors quiet;
-  GDALWarpAppOptions* parsed = GDALWarpAppOptionsNew(arguments.List(), nullptr);
-  if (parsed == nullptr) return {ErrorCode::invalid_argument, fmt::format("GDAL does not know how to resample: {}", quiet.last())};
-  const Result<GDALDatasetUniquePtr> dataset = source::open_dataset(input.source);
-  if (!dataset) return dataset.error();
-  GDALDatasetH from = GDALDataset::ToHandle(dataset.value().get());
-  const std::string name = files.add();
-  int wrong = 0;
-  GDALDatasetUniquePtr warped(GDALDataset::FromHandle(GDALWarp(name.c_str(), nullptr, 1, &from, parsed, &wrong)));
-  GDALWarpAppOptionsFree(parsed);
-  if (!warped) return unsupported(input, fmt::format("cannot be brought onto the output's grid: {}", quiet.last()));
-  warped->GetRasterBand(1)->GetBlockSize(&input.block_x, &input.block_y);
-  if (picture && input.alpha_band == 0) input.alpha_band = warped->GetRasterCount();
-  input.source = name;
-  input.columns = warped->GetRasterXSize();
-  input.rows = warped->GetRasterYSize();
-  input.type = plan.layout.type;
-  if (!picture) input.no_data = plan.layout.no_data;
-  input.has_mask = false;
-  return {};
-}
-
 std::string source_xml(const Input& input, const IngestOptions& options, const OutputPlan& plan, int band) {
   const bool is_alpha = plan.layout.alpha && band == plan.layout.bands;
   const Rectangle& place = input.place;
@@ -600,20 +328,20 @@ bool is_the_output(const std::vector<Input>& inputs, const OutputPlan& plan) {
 }
 
 /// What every chunk depends on.
-void hash_chunks(const std::vector<Input>& inputs, const IngestOptions& options, OutputPlan& plan) {
-  const std::string common = fmt::format("{}|{}|GDAL {}", plan.description(), options.resampling, GDALVersionInfo("VERSION_NUM"));
+void hash_chunks(const std::vector<Input>& inputs, const IngestOptions& options, const RepairPlan& repair, OutputPlan& plan) {
+  const std::string common = fmt::format("{}|{}|GDAL {}{}", plan.description(), options.resampling, GDALVersionInfo("VERSION_NUM"), repair.description());
   plan.chunk_hashes.assign(static_cast<std::size_t>(plan.chunk_columns()) * static_cast<std::size_t>(plan.chunk_rows()), "");
   for (std::size_t i = 0; i < plan.chunk_hashes.size(); ++i) {
     const Chunk chunk = chunk_of(plan, static_cast<int>(i));
     std::string text;
     for (const Input& input : inputs) {
       // Resampling reaches beyond a pixel by a few of the coarser of the two grids.
-      const double reach = 4.0 * std::max({1.0, input.place.width / input.columns, input.place.height / input.rows});
+      const double reach = repair.margin() + 4.0 * std::max({1.0, input.place.width / input.columns, input.place.height / input.rows});
       const Rectangle& place = input.place;
       const bool touches = place.x - reach < chunk.x + chunk.width && chunk.x < place.x + place.width + reach && place.y - reach < chunk.y + chunk.height && chunk.y < place.y + place.height + reach;
       if (touches) text += fmt::format("|{} {} {} {} {} {}", input.revision, place.x, place.y, place.width, place.height, input.warped ? source::wkt_of(input.crs) : "");
     }
-    if (!text.empty()) plan.chunk_hashes[i] = fmt::format("{:016x}{:016x}", fnv1a(common + text), fnv1a(fmt::format("{}{}{}", chunk.x, text, chunk.y)));
+    if (!text.empty() || repair.base() != nullptr) plan.chunk_hashes[i] = fmt::format("{:016x}{:016x}", fnv1a(common + text), fnv1a(fmt::format("{}{}{}", chunk.x, text, chunk.y)));
   }
 }
 
@@ -647,9 +375,9 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   plan.block = options.block;
   plan.point_samples = std::all_of(inputs.begin(), inputs.end(), [](const Input& input) { return input.point_samples; });
   if (Result<void> chosen = choose_grid(options, inputs, plan, plan.crs); !chosen) return chosen.error();
-  if (Result<void> chosen = choose_samples(inputs, plan); !chosen) return chosen.error();
+  if (Result<void> chosen = choose_samples(inputs, options, plan); !chosen) return chosen.error();
   if (Result<void> chosen = choose_codec(options, inputs, plan); !chosen) return chosen.error();
-  choose_chunks(plan, stored_row_pixels(inputs));
+  choose_chunks(plan, options.repair.any() ? 0 : stored_row_pixels(inputs));  // wide ones cost memory for margins
   // Finer ones over coarser ones; of one fineness the later over the earlier.
   const auto fineness = [](const Input& input) { return input.place.width * input.place.height / (static_cast<double>(input.columns) * input.rows); };
   std::stable_sort(inputs.begin(), inputs.end(), [&](const Input& a, const Input& b) { return fineness(a) > fineness(b) * 1.01; });
@@ -657,7 +385,10 @@ Result<Mosaic> Mosaic::create(const IngestOptions& options) {
   OGRSpatialReference declared = *crs;
   if (Result<void> put = declare_vertical(options, declared); !put) return put.error();
   plan.crs = source::wkt_of(declared);
-  hash_chunks(inputs, options, plan);
+  Result<RepairPlan> repair = RepairPlan::create(options, inputs.front().kind, before);
+  if (!repair) return repair.error();
+  mosaic.repair_ = std::move(*repair);
+  hash_chunks(inputs, options, mosaic.repair_, plan);
   for (Input& input : inputs) {
     if (!input.warped) continue;
     if (Result<void> warped = warp(input, options, before, *files); !warped) return warped.error();

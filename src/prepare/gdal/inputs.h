@@ -7,6 +7,7 @@
 #include <gdal_priv.h>
 
 #include "base/result.h"
+#include "prepare/gdal/repair.h"
 #include "prepare/ingest.h"
 #include "prepare/plan.h"
 
@@ -19,11 +20,13 @@ class Mosaic {
   static Result<Mosaic> create(const IngestOptions& options);
 
   const OutputPlan& plan() const { return plan_; }
+  const RepairPlan& repair() const { return repair_; }
   /// A data set of its own for each thread. Errors: as open_dataset.
   Result<GDALDatasetUniquePtr> open() const;
 
  private:
   OutputPlan plan_;
+  RepairPlan repair_;
   std::string name_;
   std::shared_ptr<const void> files_;  ///< in GDAL's memory, removed with the last mosaic that needs them
 };
