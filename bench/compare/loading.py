@@ -35,7 +35,7 @@ DELAY_MS = 20
 SPEED, FLIGHT_S = 250.0, 60
 METRES_A_DEGREE = 111_320
 STANDS_S = 12
-SAMPLED_FILES = 40
+SAMPLED_FILES = 60
 LINE_BITS_PER_SECOND = 2_000_000
 
 
@@ -113,8 +113,8 @@ def teleport(server, pose, options):
 
 
 def final_set(server, pose, options):
-    """How many of the files that a cold view fetches its finished picture rests on: those without which, offline, it is another picture. Tried for
-    each zoom as a whole, then for a sample of the files of the zooms that matter."""
+    """How many of the files that a cold view fetches its finished picture rests on: the planet's coarsest tiles, and those without which,
+    offline, it is another picture. Tried for each zoom as a whole, then for a sample of the files of the zooms that matter."""
     with tempfile.TemporaryDirectory(prefix="tellurion-loading-") as name:
         folder = pathlib.Path(name)
         world = run.world_file(folder, server)
@@ -132,16 +132,21 @@ def final_set(server, pose, options):
                 database.executemany("DELETE FROM files WHERE key = ?", [(key,) for key in keys])
             return picture(place, "--offline", "--timeout", 20)
 
+        coarsest = folder / "coarsest"
+        coarsest.mkdir()
+        run.run_tellurion([options.tellurion, "render", world, "--camera", "0,0,5e7", "--out", coarsest / "p.png", *run.common_options(1000, coarsest)], options)
+        roots = kept_files(coarsest / "cache")
         picture(folder)
         files = [key for key in kept_files(folder / "cache") if "/imagery/" in key or "/terrain/" in key]
         whole = without([])
         groups = {}
-        for key in files:
+        for key in set(files) - set(roots):
             groups.setdefault(tuple(key.split("/")[-4:-2]), []).append(key)
         needed = [key for group in groups.values() if without(group) != whole for key in group]
-        sample = random.Random(1).sample(needed, min(len(needed), SAMPLED_FILES))
+        sample = random.Random(1).sample(sorted(needed), min(len(needed), SAMPLED_FILES))
         share = sum(without([key]) != whole for key in sample) / len(sample)
-        return {"files": len(files), "of_zooms_needed": len(needed), "sampled": len(sample), "share_needed": share, "ratio": len(files) / (share * len(needed))}
+        return {"files": len(files), "coarsest": len(roots), "of_zooms_needed": len(needed), "sampled": len(sample), "share_needed": share,
+                "ratio": len(files) / (len(roots) + share * len(needed))}
 
 
 def final_sets(options):
@@ -211,8 +216,8 @@ def report(figures):
     lines = [figures["machine"], "", "| teleport | requests | MB | cold s | warm s | network s | ratio | warm requests |", "|---|---|---|---|---|---|---|---|"]
     lines += [f"| {name} | {f['cold_requests']:.0f} | {f['cold_bytes'] / 1e6:.2f} | {f['cold_s']:.2f} | {f['warm_s']:.2f} | {f['network_s']:.2f} | {f['ratio']:.2f} | {f['warm_requests']:.0f} |"
               for name, f in figures["teleports"].items()]
-    lines += ["", "| final set | files fetched | of zooms that matter | of a sample of them needed | ratio |", "|---|---|---|---|---|"]
-    lines += [f"| {name} | {f['files']} | {f['of_zooms_needed']} | {f['share_needed']:.1%} of {f['sampled']} | {f['ratio']:.2f} |" for name, f in figures["final_sets"].items()]
+    lines += ["", "| final set | files fetched | coarsest tiles | of other zooms that matter | of a sample of them needed | ratio |", "|---|---|---|---|---|---|"]
+    lines += [f"| {name} | {f['files']} | {f['coarsest']} | {f['of_zooms_needed']} | {f['share_needed']:.1%} of {f['sampled']} | {f['ratio']:.2f} |" for name, f in figures["final_sets"].items()]
     flight = figures["flight"]
     lines += ["", f"Flight at {SPEED:.0f} m/s for {FLIGHT_S} s: {flight['files']} files, {flight['bytes'] / 1e6:.2f} MB; {flight['files_in_vain']} files and "
               f"{flight['share_in_vain']:.1%} of the bytes are not among the {flight['finished_files']} files of the finished flight."]

@@ -4,6 +4,19 @@
 #include <tuple>
 
 namespace tellurion::surface {
+namespace {
+
+/// Texels of a tile that finer ones will cover are worth their bytes if they are not much coarser than the picture on the way to
+/// them, nor nearly as fine: one step of kOutlookLevels for most tiles.
+constexpr double kFinestStepPixels = 8, kCoarsestStepPixels = 64;
+
+bool is_worth_a_step(const SelectionFrame& frame, const Node& node) {
+  const double px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share / frame.settings.sse_px;
+  return px >= kFinestStepPixels && px < kCoarsestStepPixels;
+}
+
+}  // namespace
+
 void RequestList::find(const SelectionFrame& frame, std::vector<TileRequest>& requests, SelectionStats& stats) {
   requests_.clear();
   stats.tiles_waiting = 0;
@@ -58,7 +71,7 @@ void RequestList::collect(const SelectionFrame& frame, Node& node, StandIn shown
   if (node.split) {
     const bool is_step = shown.node != nullptr && node.key.level % kOutlookLevels == 0;
     if (is_step && !has_geometry) want(frame, node, Part::geometry, shown_px);
-    if (is_step) want_colour(frame, node);
+    if (is_step && is_worth_a_step(frame, node)) want_colour(frame, node);
     if (is_step && shown.node != &node) shown.held_up_px = 0;
     for (int i = 0; i < 4; ++i) collect(frame, node.children[i], shown, stats);
     return;
@@ -73,7 +86,9 @@ void RequestList::collect(const SelectionFrame& frame, Node& node, StandIn shown
   const bool has_slopes = slopes.resident(Part::geometry) != nullptr;
   if (!has_slopes && &slopes != &node) want(frame, slopes, Part::geometry, shown_px - node.geometry_px);
 
-  const bool has_colour = want_colour(frame, node);
+  // One that only waits to learn how it is to be split: finer ones will show the colours.
+  const bool is_passed = node.facts.assumed && !has_geometry && !node.colour_suffices && frame.settings.metric == LodMetric::screen_space_error;
+  const bool has_colour = is_passed && !is_worth_a_step(frame, node) ? node.colour_owner->resident(Part::colour) != nullptr : want_colour(frame, node);
   if (!has_geometry || !has_slopes || !has_colour) ++stats.tiles_waiting;
 }
 
