@@ -22,7 +22,8 @@ struct WorldOptions {
   std::vector<std::string> words;   ///< data, or layers
   std::string group, name, to;
   bool is_list = false;
-  std::optional<double> opacity;
+  std::string vertical;
+  std::optional<double> opacity, no_data;
 };
 
 std::string absolute(const std::string& path) {
@@ -73,6 +74,12 @@ Result<void> add_layers(globe::WorldText& text, const std::vector<globe::World>&
     if (!options.name.empty()) layer.name = options.name;
     if (const auto group = globe::group_by_name(options.group)) layer.group = *group;
     if (options.opacity) layer.opacity = *options.opacity;
+    if (!options.vertical.empty()) layer.source.vertical = options.vertical;
+    if (options.no_data) {
+      const std::string& type = layer.source.type;
+      if (type != "gdal" && type != "cog" && type != "catalogue") return {ErrorCode::invalid_argument, fmt::format("{}: --no-data is of rasters, not of sources of type \"{}\"", layer.name, type)};
+      layer.source.no_data = options.no_data;
+    }
     if (std::ranges::find(text.world().layers, layer.name, &globe::LayerSpec::name) != text.world().layers.end())
       return {ErrorCode::invalid_argument, fmt::format("{} has a layer called \"{}\": choose another --name", options.world, layer.name)};
     if (Result<void> added = text.add_layer(layer); !added) return added;
@@ -153,9 +160,11 @@ void add_world_files(CLI::App& app, Run& run) {
   group->check([](const std::string& word) { return globe::group_by_name(word) ? std::string() : fmt::format("no group is called \"{}\": see docs/world-file.md", word); });
   CLI::Option* name = adding->add_option("--name", options->name, "of the layer (default: the file's)");
   CLI::Option* opacity = adding->add_option("--opacity", options->opacity, "of the layer, 0 to 1")->check(CLI::Range(0.0, 1.0));
+  CLI::Option* vertical = adding->add_option("--vertical", options->vertical, "what heights are above: ellipsoid, egm96 or a vertical CRS (default: what the data say)")->type_name("DATUM");
+  CLI::Option* no_data = adding->add_option("--no-data", options->no_data, "the value of rasters that means nothing is there (default: their own)")->type_name("VALUE");
   CLI::Option* is_list = adding->add_flag("--list", options->is_list, "the data are lists of rasters (a VRT, an index of gdaltindex, STAC items): a catalogue of each");
   CLI::Option* to = adding->add_option("--to", options->to, "put the rasters into this catalogue (name or number) instead")->type_name("LAYER");
-  for (CLI::Option* other : {group, name, opacity, is_list}) to->excludes(other);
+  for (CLI::Option* other : {group, name, opacity, vertical, no_data, is_list}) to->excludes(other);
 
   CLI::App* removing = sub("remove", "take layers out, or files that a catalogue lists", remove);
   removing->add_option("WORLD", options->world, "a world file")->required()->type_name("");

@@ -233,16 +233,25 @@ void Panels::activity(const Moment& moment) {
 }
 
 void Panels::status_line(const globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment) {
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {10.0f, 5.0f});
+  const ImVec2 padding{10.0f, 5.0f};
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, padding);
+  const std::string status = status_text(stats, moment);
   anchor(0.0f, 1.0f);
   ImGui::Begin("status", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
-  ImGui::TextUnformatted(status_text(stats, moment).c_str());
+  ImGui::TextUnformatted(status.c_str());
   ImGui::End();
-  anchor(1.0f, 1.0f);
+
+  // Beside the status line, or above it where both do not fit.
+  const std::vector<std::string> credits = attributions(globe);
+  const float width = ImGui::GetIO().DisplaySize.x, wrap = 0.6f * width;
+  float widest = 0.0f;
+  for (const std::string& line : credits) widest = std::max(widest, std::min(ImGui::CalcTextSize(line.c_str()).x, wrap));
+  const bool fits = ImGui::CalcTextSize(status.c_str()).x + widest + 4 * padding.x + 3 * kMargin <= width;
+  anchor(1.0f, 1.0f, fits ? 0.0f : -(ImGui::GetTextLineHeight() + 2 * padding.y + kMargin / 2));
   ImGui::Begin("attribution", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
-  ImGui::PushTextWrapPos(0.6f * ImGui::GetIO().DisplaySize.x);
+  ImGui::PushTextWrapPos(wrap);
   ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
-  for (const std::string& line : attributions(globe)) ImGui::TextUnformatted(line.c_str());
+  for (const std::string& line : credits) ImGui::TextUnformatted(line.c_str());
   ImGui::PopStyleColor();
   ImGui::PopTextWrapPos();
   ImGui::End();

@@ -390,7 +390,7 @@ Result<void> ElevationModel::compose(Batch& batch, std::size_t count, std::span<
   if (Result<void> asked = ask_layer(batch, rasters, which, answer); !asked) return asked;
   if (Result<void> composed = compose(batch, first, answer.undecided); !composed) return composed;
   if (!layer.adds) {
-    if (Result<void> filled = fill_voids(batch, std::span(contributors_).subspan(first, count - first), answer.open); !filled) return filled;
+    if (Result<void> filled = fill_voids(batch, rasters, answer.open); !filled) return filled;
   }
   for (const OpenPlace& open : answer.open) {
     compose_one(batch.metres[open.place], open.height, layer.adds);

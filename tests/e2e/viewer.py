@@ -20,6 +20,7 @@ from _common import EARTH, PROGRAM, ROOT, Camera, Case, GeographicRaster, angle_
 
 SIZE = (640, 480)
 MIDDLE = (SIZE[0] / 2, SIZE[1] / 2)
+SEEN = slice(50, -65)  # rows without the toolbar, the status line and the credits above it
 ALPS = (45.5, 8.0, 250e3, 30.0, -55.0)
 HELD = "0.15"  # seconds; shorter clicks could fall between two frames
 
@@ -146,10 +147,10 @@ class Viewer:
         return Camera(EARTH, self.pose(), SIZE)
 
     def screen(self, name):
-        """What the window shows, without the rows of the toolbar and the status line."""
+        """What the window shows, of the rows SEEN."""
         file = self.folder / f"{name}.png"
         subprocess.run(["import", "-window", str(self.window), f"png24:{file}"], check=True, timeout=60)
-        return read_picture(file)[50:-40].astype(int)
+        return read_picture(file)[SEEN].astype(int)
 
     def close(self, key="Escape"):
         self.do("key", key)
@@ -210,7 +211,7 @@ class Picture(WindowTest):
         viewer = self.open(ALPS)
         shown = viewer.screen("window")
         drawn = read_picture(self.render(ROOT / "data/earth/world.toml", ALPS, "--size", f"{SIZE[0]}x{SIZE[1]}"))
-        far = np.abs(shown - drawn[50:-40]).max(axis=-1) > 12
+        far = np.abs(shown - drawn[SEEN]).max(axis=-1) > 12
         self.assertLess(far.mean(), 0.01)
         frames, ticks = viewer.frames(), self.processor_ticks()
         time.sleep(3.0)

@@ -57,6 +57,15 @@ class World(Case):
         self.tellurion("world", "remove", file, moved)
         self.assertRegex(self.tellurion("info", file).stdout, r"rasters +3, finer ones")
 
+    def test_what_data_do_not_say_themselves(self):
+        file = self.begin("said.toml")
+        self.tellurion("world", "add", file, shared(RAINIER), "--vertical", "egm96", "--no-data=-32767")
+        self.assertIn('vertical = "egm96"', file.read_text())
+        self.assertRegex(file.read_text(), r"no_data = -32767(\.0)?\b")
+        above_geoid = float(self.tellurion("height", file, text="46.8523 -121.7603\n").stdout.split()[2])
+        above_ellipsoid = float(self.tellurion("height", shared(RAINIER), text="46.8523 -121.7603\n").stdout.split()[2])
+        self.assertAlmostEqual(above_geoid - above_ellipsoid, -18.84, delta=0.02)  # as cs2cs from EPSG:4326+5773 to EPSG:4979 says
+
     def test_what_is_wrong_is_told_and_nothing_is_changed(self):
         file = self.begin("wrong.toml")
         before = file.read_text()
