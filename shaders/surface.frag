@@ -34,6 +34,10 @@ in vec3 v_air_light;
 in vec3 v_air_through;
 #endif
 
+// Levels of detail: a slot's texels measure half a pixel to one, and the levels that the hardware would mix for that blur. Pictures come
+// nearest to the means of 16 samples a pixel with this one (-0.5 and -1.5 are both further away): docs/decisions/0008-sharpness.md.
+const float kSharpness = -1.0;
+
 // Ground that no image covers, encoded.
 const vec3 kBareGround = vec3(0.66, 0.64, 0.60);
 
@@ -56,9 +60,9 @@ void main() {
 #elif defined(WIREFRAME)
   o_colour = vec4(level_colour(u_tile[3].w), 1.0);
 #else
-  vec4 texel = texture(u_colour, vec3(v_uv.xy, u_tile[4].w));
+  vec4 texel = texture(u_colour, vec3(v_uv.xy, u_tile[4].w), kSharpness);
 #ifdef FADE
-  texel = mix(texture(u_before, vec3(v_before_uv, u_tile[6].w)), texel, u_tile[7].x);
+  texel = mix(texture(u_before, vec3(v_before_uv, u_tile[6].w), kSharpness), texel, u_tile[7].x);
 #endif
   vec3 colour = texel.rgb + (1.0 - texel.a) * kBareGround;
 
@@ -69,7 +73,7 @@ void main() {
   float facing = (v_sun.z - dot(slope, v_sun.xy)) * inversesqrt(1.0 + dot(slope, slope));
   colour *= v_ambient.rgb + v_sunlight.rgb * max(facing, 0.0);
 #ifdef EFFECTS
-  vec4 effects = texture(u_effects, vec3(v_uv.xy, u_tile[7].w));
+  vec4 effects = texture(u_effects, vec3(v_uv.xy, u_tile[7].w), kSharpness);
   colour += v_eye.w * effects.rgb * effects.rgb;
   // The sun mirrored by waves: slopes as Cox and Munk (1954, doi:10.1364/JOSA.44.000838) measured under a wind of 5 m/s, variance
   // 0.0286, and Schlick's approximation of what water reflects. The half-way vector to a unit sun and eye has the length
@@ -89,7 +93,7 @@ void main() {
 #endif
 
 #ifdef OVERLAY
-  vec4 overlay = texture(u_overlay, vec3(v_uv.xy, u_tile[8].x));
+  vec4 overlay = texture(u_overlay, vec3(v_uv.xy, u_tile[8].x), kSharpness);
   colour = overlay.rgb + (1.0 - overlay.a) * colour;
 #endif
 #ifdef BORDERS

@@ -15,10 +15,10 @@ struct TileFacts {
                                             ///< Nothing: known once it is built
   bool assumed = false;               ///< heights and error above are what any terrain could have: built tiles know better,
                                       ///< of themselves and of their descendants (Outlook)
-  bool own_colour = false;            ///< some imagery under it is finer than its parent's texels: it gets a slot of its own
+  bool own_colour = false;            ///< some imagery under it has samples smaller than two of its parent's texels: it gets a slot of its own
   bool own_effects = false;           ///< and another one, for night and water
   bool own_overlay = false;           ///< and one for what lies over the light
-  bool finer_colour_below = false;    ///< some imagery under it is finer than its own texels
+  bool finer_colour_below = false;    ///< the same of its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels
 };
 

@@ -15,6 +15,10 @@ namespace {
 /// Spacings of equal data and tiles differ by rounding and by what the planet's shape does to them: no level for that.
 constexpr double kClearlyFiner = 0.999;
 
+/// Texels of the finest slots per sample of the imagery, along a side. A picture's pixels are interpolated between texels as these are
+/// between samples: with one of them per sample contrast would be lost to both.
+constexpr double kTexelsPerSample = 2.0;
+
 class MadeFacts final : public SurfaceFacts {
  public:
   MadeFacts(std::shared_ptr<const SurfaceDescription> description, std::shared_ptr<const ErrorTable> table)
@@ -49,8 +53,8 @@ class MadeFacts final : public SurfaceFacts {
     if (!facts.height_error && finest_height == std::numeric_limits<double>::infinity()) facts.height_error = HeightError{};
 
     const double finest_colour = finest_spacing(description_->colours, key);
-    const double colour_texel = nominal_colour_texel(ellipsoid, key.level);
-    facts.own_colour = key.level == 0 || finest_colour < kClearlyFiner * 2.0 * colour_texel;
+    const double shown_by_texel = kTexelsPerSample * nominal_colour_texel(ellipsoid, key.level);
+    facts.own_colour = key.level == 0 || finest_colour < kClearlyFiner * 2.0 * shown_by_texel;
     const auto has_any_of = [&](std::initializer_list<ImageUse> uses) {
       return facts.own_colour && std::ranges::any_of(description_->colours, [&](const Layer& layer) {
                return layer.enabled && std::ranges::find(uses, layer.use) != uses.end() && coverage_of(layer).touches(key);
@@ -58,7 +62,7 @@ class MadeFacts final : public SurfaceFacts {
     };
     facts.own_effects = has_any_of({ImageUse::night, ImageUse::water});
     facts.own_overlay = has_any_of({ImageUse::overlay});
-    facts.finer_colour_below = finest_colour < kClearlyFiner * colour_texel;
+    facts.finer_colour_below = finest_colour < kClearlyFiner * shown_by_texel;
     facts.own_slopes = key.level == 0 || finest_height < kClearlyFiner * 2.0 * nominal_slope_texel(ellipsoid, key.level);
     return facts;
   }

@@ -221,7 +221,7 @@ TEST_CASE("make_facts: without a table, safe assumptions that shrink with the le
   CHECK(facts->facts_of(geo::TileKey{2, 4, 1, 1}).height_error == HeightError{});  // where there is nothing
 }
 
-TEST_CASE("make_facts: imagery asks for slots down to where its pixels are a texel, and no further") {
+TEST_CASE("make_facts: imagery asks for slots down to where its pixels are two texels, and no further") {
   auto description = std::make_shared<SurfaceDescription>();
   description->ellipsoid = geo::kWgs84;
   MadeRaster picture;
@@ -230,7 +230,7 @@ TEST_CASE("make_facts: imagery asks for slots down to where its pixels are a tex
   const auto facts = make_facts(description, nullptr);
   for (int level = 0; level < 8; ++level) {
     const TileFacts known = facts->facts_of({0, static_cast<std::uint8_t>(level), 0, 0});
-    CHECK(known.own_colour == (nominal_colour_texel(geo::kWgs84, level) * 2 > 9790));
-    CHECK(known.finer_colour_below == (nominal_colour_texel(geo::kWgs84, level) > 9790));
+    CHECK(known.own_colour == (nominal_colour_texel(geo::kWgs84, level) * 4 > 9790));
+    CHECK(known.finer_colour_below == (nominal_colour_texel(geo::kWgs84, level) * 2 > 9790));
   }
 }
