@@ -128,6 +128,14 @@ Result<Frozen<raster::Image>> BlockCache::image(const BlockKey& key, const Decod
   return state_->find_or_decode<raster::Image>(Name{key, true}, decode);
 }
 
+Frozen<raster::HeightGrid> BlockCache::resident_heights(const BlockKey& key) {
+  std::lock_guard lock(state_->mutex);
+  const auto found = state_->index.find(Name{key, false});
+  if (found == state_->index.end()) return {};
+  state_->entries.splice(state_->entries.begin(), state_->entries, found->second);
+  return std::get<Frozen<raster::HeightGrid>>(found->second->block);
+}
+
 SourceReads BlockCache::reads_of(std::uint32_t source) const {
   std::lock_guard lock(state_->mutex);
   const auto found = state_->reads.find(source);

@@ -51,6 +51,9 @@ class BlockCache {
   Result<Frozen<raster::HeightGrid>> heights(const BlockKey& key, const DecodeHeights& decode);
   Result<Frozen<raster::Image>> image(const BlockKey& key, const DecodeImage& decode);
 
+  /// The block if it is there; null otherwise, without waiting for a thread that decodes it.
+  Frozen<raster::HeightGrid> resident_heights(const BlockKey& key);
+
   SourceReads reads_of(std::uint32_t source) const;
 
   std::size_t bytes() const;

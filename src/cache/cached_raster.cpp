@@ -65,6 +65,11 @@ bool CachedRaster::take_pending(source::Awaited& awaited) {
   return true;
 }
 
+Result<Frozen<raster::HeightGrid>> CachedRaster::resident(const BlockKey& key) const {
+  if (auto block = cache_->resident_heights(key)) return block;
+  return Error{ErrorCode::pending, description().name};
+}
+
 Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int column, int row) {
   const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
   const auto found = std::find_if(held_.begin(), held_.end(), [&](const Held& held) { return held.key == key; });
@@ -81,11 +86,12 @@ Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int colu
   for (const Held& absent : absent_) {
     if (absent.key == key) return absent.block.get();
   }
-  Result<Frozen<raster::HeightGrid>> block = cache_->heights(key, std::cref(decode));
+  Result<Frozen<raster::HeightGrid>> block = reads_ ? cache_->heights(key, std::cref(decode)) : resident(key);
   if (!block && block.error().code == ErrorCode::pending) {
+    static const Frozen<raster::HeightGrid> zeros =
+        freeze(raster::HeightGrid{kBlockSide, kBlockSide, std::vector<float>(static_cast<std::size_t>(kBlockSide) * kBlockSide, 0.0f)});
     pending_ = true;
-    raster::HeightGrid zeros{kBlockSide, kBlockSide, std::vector<float>(static_cast<std::size_t>(kBlockSide) * kBlockSide, 0.0f)};
-    absent_.push_back(Held{key, freeze(std::move(zeros))});
+    absent_.push_back(Held{key, zeros});
     return absent_.back().block.get();
   }
   if (!block) return block.error();

@@ -34,6 +34,9 @@ class CachedRaster {
   bool take_pending(source::Awaited& awaited);
   bool is_pending() const { return pending_; }
 
+  /// From now on heights are those of blocks in memory: others count as on their way, but nothing is read and nothing asked for.
+  void read_nothing() { reads_ = false; }
+
   /// Bilinear heights at `pixels` (continuous, of level 0), from the samples of `level`.
   /// Between 0.5 pixels inside and the border the outermost samples are continued. NaN pixels: coverage 0.
   Result<void> sample_heights(int level, std::span<const glm::dvec2> pixels, std::span<HeightSample> heights);
@@ -55,6 +58,7 @@ class CachedRaster {
     glm::dvec2 first_centre{0.0};
     glm::dvec2 last_cell{0.0};  ///< from `first_centre`
   };
+  Result<Frozen<raster::HeightGrid>> resident(const BlockKey& key) const;
   Result<const raster::HeightGrid*> height_block(int level, int column, int row);
   Result<HeightSample> sample_anywhere(int level, glm::dvec2 pixel, BlockView& view);
 
@@ -67,6 +71,7 @@ class CachedRaster {
     Frozen<raster::HeightGrid> block;
   };
   std::vector<Held> held_;  ///< the last blocks used, few
+  bool reads_ = true;
   bool pending_ = false;
   std::vector<Held> absent_;  ///< zeros in the place of blocks on their way
 };

@@ -5,25 +5,25 @@
 #include "surface/tile_builder.h"
 
 namespace tellurion::globe {
-namespace {
-
-/// `model`, opened anew if it belongs to another description.
-template <class Model>
-Result<Model*> model_of(std::optional<Model>& model, std::shared_ptr<const surface::SurfaceDescription> surface,
-                        cache::BlockCache& cache) {
-  if (!model || model->description().revision != surface->revision) {
-    model.reset();
-    auto opened = Model::open(std::move(surface), cache);
-    if (!opened) return opened.error();
-    model.emplace(std::move(*opened));
-  }
-  return &*model;
-}
-
-}  // namespace
 
 Result<surface::ElevationModel*> SurfaceWorker::elevation(std::shared_ptr<const surface::SurfaceDescription> surface) {
-  return model_of(elevation_, std::move(surface), cache_);
+  if (!elevation_ || elevation_->description().heights != surface->heights) {
+    elevation_.reset();
+    auto opened = surface::ElevationModel::open(std::move(surface), cache_);
+    if (!opened) return opened.error();
+    elevation_.emplace(std::move(*opened));
+  }
+  return &*elevation_;
+}
+
+Result<surface::ColourModel*> SurfaceWorker::colours(std::shared_ptr<const surface::SurfaceDescription> surface) {
+  if (!colours_ || colours_->description().colours != surface->colours) {
+    auto opened = surface::ColourModel::open(std::move(surface), cache_, colours_ ? &*colours_ : nullptr);
+    colours_.reset();
+    if (!opened) return opened.error();
+    colours_.emplace(std::move(*opened));
+  }
+  return &*colours_;
 }
 
 Result<surface::TileGeometry> SurfaceWorker::build_geometry(std::shared_ptr<const surface::SurfaceDescription> surface,
@@ -37,7 +37,7 @@ Result<surface::TileGeometry> SurfaceWorker::build_geometry(std::shared_ptr<cons
 
 Result<surface::TileImagery> SurfaceWorker::build_colour(std::shared_ptr<const surface::SurfaceDescription> surface,
                                                          const geo::TileKey& key, std::stop_token stop) {
-  const auto model = model_of(colours_, std::move(surface), cache_);
+  const auto model = colours(std::move(surface));
   if (!model) return model.error();
   auto imagery = surface::build_imagery(**model, key, stop);
   if ((*model)->take_pending(awaited_)) return Error{ErrorCode::pending, "imagery of " + geo::to_string(key)};

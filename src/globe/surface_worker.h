@@ -31,6 +31,8 @@ class SurfaceWorker {
   Result<surface::ElevationModel*> elevation(std::shared_ptr<const surface::SurfaceDescription> surface);
 
  private:
+  Result<surface::ColourModel*> colours(std::shared_ptr<const surface::SurfaceDescription> surface);
+
   cache::BlockCache& cache_;
   std::optional<surface::ElevationModel> elevation_;
   std::optional<surface::ColourModel> colours_;

@@ -184,6 +184,7 @@ ElevationModel::HeightLayer* ElevationModel::open_data_set(const source::Catalog
   Result<cache::CachedRaster> raster = cache::CachedRaster::open(**source, *cache_, id);
   if (!raster) return nullptr;
   const geo::GeodeticBounds reach = reach_of((*source)->description());
+  if (!reads_) raster->read_nothing();
   data_sets_.emplace_front(id, HeightLayer{std::move(*source), std::move(raster).value(), reach, {}, {}});
   data_set_index_[id] = data_sets_.begin();
   return &data_sets_.front().second;
@@ -307,6 +308,12 @@ struct ElevationModel::LatticeBatch final : Batch {
   std::unordered_map<const HeightLayer*, LatticePixels::InRaster> in_rasters;
   std::vector<glm::dvec2>& room;
 };
+
+void ElevationModel::read_nothing() {
+  reads_ = false;
+  for (auto& [settings, layer] : layers_) layer.raster.read_nothing();
+  for (auto& [id, layer] : data_sets_) layer.raster.read_nothing();
+}
 
 bool ElevationModel::is_pending() const {
   const auto waits = [](const auto& entry) { return entry.second.raster.is_pending(); };

@@ -36,6 +36,8 @@ struct Layer {
   float multiplier = 1.0f;
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
   ImageUse use = ImageUse::colour;  ///< image layers: what they are drawn into
+
+  friend bool operator==(const Layer&, const Layer&) = default;
 };
 
 /// Where the layer has data.
@@ -76,6 +78,10 @@ class ElevationModel {
   static Result<ElevationModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
 
   const SurfaceDescription& description() const { return *description_; }
+
+  /// From now on answers rest on samples in memory alone, others count as on their way: see take_pending. Rasters of a catalogue are
+  /// still opened when they are first met.
+  void read_nothing();
 
   /// Bilinear heights at places given by unit normals, from every layer's coarsest level whose samples are at most
   /// `wanted_spacing` metres apart (0: the finest). Doubles: a float's step of 0.5 mm at 8 km would show in deep tiles.
@@ -165,6 +171,7 @@ class ElevationModel {
   std::shared_ptr<const SurfaceDescription> description_;
   cache::BlockCache* cache_ = nullptr;
   bool has_catalogue_ = false;
+  bool reads_ = true;
   std::unordered_map<const Layer*, HeightLayer> layers_;  ///< those of one source
   std::list<std::pair<std::uint32_t, HeightLayer>> data_sets_;  ///< open ones of catalogues by their number, the last used first
   std::unordered_map<std::uint32_t, std::list<std::pair<std::uint32_t, HeightLayer>>::iterator> data_set_index_;

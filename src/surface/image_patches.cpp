@@ -286,19 +286,26 @@ Result<ImagePatch> make_patch(cache::CachedRaster& raster, const geo::TileKey& k
 
 }  // namespace
 
-Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache) {
+Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache, ColourModel* before) {
   ColourModel model;
   model.cache_ = &cache;
   for (const Layer& layer : description->colours) {
     if (!layer.enabled) continue;
-    ColourLayer& opened = model.layers_.emplace_back(ColourLayer{&layer, {}});
-    if (layer.catalogue) continue;
+    ColourLayer& opened = model.layers_.emplace_back(ColourLayer{&layer, before ? before->take_rasters(layer) : std::list<OpenRaster>{}});
+    if (layer.catalogue || !opened.rasters.empty()) continue;
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
     if (!raster) return raster.error();
     opened.rasters.push_back({layer.source_id, layer.source, std::move(raster).value()});
   }
   model.description_ = std::move(description);
   return model;
+}
+
+std::list<ColourModel::OpenRaster> ColourModel::take_rasters(const Layer& layer) {
+  const auto same = std::ranges::find_if(layers_, [&](const ColourLayer& one) {
+    return one.settings->source_id == layer.source_id && one.settings->source == layer.source && !one.settings->catalogue == !layer.catalogue;
+  });
+  return same == layers_.end() ? std::list<OpenRaster>{} : std::exchange(same->rasters, {});
 }
 
 Result<cache::CachedRaster*> ColourModel::open_data_set(ColourLayer& layer, std::uint32_t index) {

@@ -19,7 +19,8 @@ namespace tellurion::surface {
 /// The enabled colour layers as one worker reads them, lowest first. Belongs to one thread.
 class ColourModel {
  public:
-  static Result<ColourModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache);
+  /// `before`: a model of the same thread that is not needed any more; rasters that both show stay open.
+  static Result<ColourModel> open(std::shared_ptr<const SurfaceDescription> description, cache::BlockCache& cache, ColourModel* before = nullptr);
 
   const SurfaceDescription& description() const { return *description_; }
 
@@ -41,6 +42,8 @@ class ColourModel {
   };
 
   ColourModel() = default;
+  /// The open rasters of the layer, taken out; none if it is not there.
+  std::list<OpenRaster> take_rasters(const Layer& layer);
   /// Errors: those of opening.
   Result<cache::CachedRaster*> open_data_set(ColourLayer& layer, std::uint32_t index);
 

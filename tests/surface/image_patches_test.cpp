@@ -347,3 +347,21 @@ TEST_CASE("build_imagery: a layer that cannot be read is named, and the others a
   CHECK(imagery.missing[0].source_id == 2);
   CHECK(imagery.missing[0].error.code == ErrorCode::unavailable);
 }
+
+TEST_CASE("ColourModel: rasters that the model before has open stay open") {
+  MadeRaster raster;
+  raster.colour = [](int x, int y) { return std::array<std::uint8_t, 4>{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 50, 255}; };
+  Pictures before({layer_of(raster, 1), layer_of(raster, 2)});
+  const auto readers = [&](std::size_t layer) { return dynamic_cast<const MadeSource&>(*before.description->colours[layer].source).readers_opened; };
+  const geo::TileKey key{2, 1, 0, 1};
+  auto now = std::make_shared<SurfaceDescription>(*before.description);
+  now->colours[0].opacity = 0.5f;
+  now->colours[1].source_id = 3;  // its content is another
+  ColourModel taken = ColourModel::open(now, before.blocks, &*before.model).value();
+  CHECK(readers(0) == 1);
+  CHECK(readers(1) == 2);
+  ColourModel fresh = ColourModel::open(now, before.blocks).value();
+  const TileImagery a = build_imagery(taken, key).value(), b = build_imagery(fresh, key).value();
+  REQUIRE(a.patches.size() == b.patches.size());
+  for (std::size_t i = 0; i < a.patches.size(); ++i) CHECK(a.patches[i].image.rgba == b.patches[i].image.rgba);
+}

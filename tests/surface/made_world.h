@@ -58,8 +58,10 @@ class MadeSource final : public source::RasterSource, public source::Coverage {
   const source::Coverage& coverage() const override { return *this; }
   std::string revision() const override { return made_.revision; }
   Result<std::unique_ptr<source::RasterReader>> open_reader() const override {
+    ++readers_opened;
     return std::unique_ptr<source::RasterReader>(std::make_unique<Reader>(*this));
   }
+  mutable int readers_opened = 0;
 
   bool touches(const geo::TileKey& key) const override {
     if (about_.wraps) return true;
