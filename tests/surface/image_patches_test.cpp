@@ -282,6 +282,33 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
   CHECK(in_void > 300);
 }
 
+TEST_CASE("build_imagery: where two layers end on one line nothing shows between them") {
+  MadeRaster west, east;
+  west.width = west.height = east.width = east.height = 500;
+  west.west = 10, west.east = east.west = 15, east.east = 20;
+  west.south = east.south = 42.5, west.north = east.north = 47.5;
+  west.colour = east.colour = [](int, int) { return std::array<std::uint8_t, 4>{200, 100, 50, 255}; };
+  Pictures pictures({layer_of(west, 1), layer_of(east, 2)});
+  for (int level = 6; level <= 10; ++level) {
+    const geo::TileKey key = geo::tile_at(geo::normal_at(at(45.1, 15.0)), level);
+    CAPTURE(geo::to_string(key));
+    const TileImagery imagery = pictures.of(key);
+    REQUIRE(imagery.patches.size() == 2);
+    int on_the_line = 0;
+    for (int i = 0; i < 256; ++i) {
+      for (int j = 0; j < 256; ++j) {
+        const glm::dvec2 st = slot_st(i + 0.5, j + 0.5);
+        const geo::LatLon place = geo::place_of_normal(geo::tile_normal(key, st));
+        const double latitude = to_degrees(place.latitude).value, longitude = to_degrees(place.longitude).value;
+        if (latitude < 43.5 || latitude > 46.5 || std::abs(longitude - 15) > 0.02) continue;
+        REQUIRE(glm::distance(composed(imagery, st), glm::dvec4(200, 100, 50, 255)) < 1.01);
+        ++on_the_line;
+      }
+    }
+    CHECK(on_the_line > 100);
+  }
+}
+
 TEST_CASE("build_imagery: layers keep their order and settings; one that hides all below leaves them out") {
   MadeRaster white = normals_picture(512), half = normals_picture(512);
   half.colour = [](int, int) { return std::array<std::uint8_t, 4>{0, 64, 0, 128}; };
