@@ -23,11 +23,10 @@ namespace {
 struct ClosedSides {
   bool top = false;
   bool bottom = false;
+  /// Pixels beyond the other sides that repeat the border: without them two rasters that end on one line would both be half transparent
+  /// on it, and what lies below would show.
+  int kept = 0;
 };
-
-/// Pixels beyond the other sides that repeat the border: without them two rasters that end on one line would both be half transparent
-/// on it, and what lies below would show.
-constexpr int kKept = 1;
 
 ClosedSides closed_sides(const source::RasterDescription& raster, source::RasterReader& reader) {
   const source::LevelSize& size = raster.levels.front();
@@ -39,7 +38,7 @@ ClosedSides closed_sides(const source::RasterDescription& raster, source::Raster
     return std::all_of(places.begin(), places.end(),
                        [&](const geo::LatLon& p) { return std::cos(p.latitude.value) < 0.5 * step; });
   };
-  return {is_pole(0.0), is_pole(size.height)};
+  return {is_pole(0.0), is_pole(size.height), 0};
 }
 
 /// A window of a level, to be reduced by whole factors on each axis after reading.
@@ -121,7 +120,7 @@ void clear_outside(raster::Image& image, const source::PixelWindow& window, cons
                    const ClosedSides& closed) {
   for (int j = 0; j < window.height; ++j) {
     const int y = window.y + j;
-    const bool row_outside = (y < -kKept && !closed.top) || (y >= size.height + kKept && !closed.bottom);
+    const bool row_outside = (y < -closed.kept && !closed.top) || (y >= size.height + closed.kept && !closed.bottom);
     const auto row = image.rgba.begin() + static_cast<std::ptrdiff_t>(image.offset(0, j));
     const auto clear = [&](int from, int to) {
       if (from < to) std::fill(row + 4 * from, row + 4 * to, std::uint8_t{0});
@@ -129,8 +128,8 @@ void clear_outside(raster::Image& image, const source::PixelWindow& window, cons
     if (row_outside) {
       clear(0, window.width);
     } else if (!wraps) {
-      clear(0, std::clamp(-kKept - window.x, 0, window.width));
-      clear(std::clamp(size.width + kKept - window.x, 0, window.width), window.width);
+      clear(0, std::clamp(-closed.kept - window.x, 0, window.width));
+      clear(std::clamp(size.width + closed.kept - window.x, 0, window.width), window.width);
     }
   }
 }
@@ -349,7 +348,8 @@ class Composition {
   Result<void> add(const Layer& settings, std::uint32_t source_id, cache::CachedRaster& raster) {
     source::RasterReader& reader = raster.reader();
     const SlotMapping mapping = map_slot(world_, key_, raster.description(), reader);
-    const ClosedSides closed = closed_sides(raster.description(), reader);
+    ClosedSides closed = closed_sides(raster.description(), reader);
+    if (settings.catalogue || !raster.description().wraps) closed.kept = 1;  // what goes all round has no neighbours
     bool hides_all_below = mapping.whole;
     for (const ControlGrid& grid : mapping.grids) {
       if (stop_.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key_)};
