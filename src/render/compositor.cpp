@@ -15,7 +15,7 @@ using surface::ImagePatch;
 
 constexpr std::uint32_t kAdjust = 1, kMask = 2, kGrayscale = 4;  // feature bits
 constexpr std::size_t kMaxScratch = 8;
-enum Uniform { u_slot_range, u_cells, u_image_texels, u_adjust };
+enum Uniform { u_slot_range, u_cells, u_image_texels, u_extent, u_pixel, u_adjust };
 
 constexpr float kSide = surface::kColourSlotSide;
 constexpr float kGutter = surface::kColourGutter;
@@ -38,7 +38,7 @@ Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
   gpu::ProgramFamily programs({shader_texts({"compose.vert"}),
                                shader_texts({"compose.frag"}),
                                {"ADJUST", "MASK", "GRAYSCALE"},
-                               {"u_slot_range", "u_cells", "u_image_texels", "u_adjust"},
+                               {"u_slot_range", "u_cells", "u_image_texels", "u_extent", "u_pixel", "u_adjust"},
                                {"u_image", "u_below"},
                                {}});
   for (const std::uint32_t features : {0u, kAdjust, kMask, kAdjust | kMask, kGrayscale, kAdjust | kGrayscale}) {
@@ -148,6 +148,9 @@ Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch
   glUniform2i(locations[u_cells], patch.columns, patch.rows);
   glUniform4f(locations[u_image_texels], static_cast<float>(patch.image.width), static_cast<float>(patch.image.height),
               static_cast<float>(scratch.width), static_cast<float>(scratch.height));
+  const glm::vec2 size(patch.image.width, patch.image.height), lower = patch.data_lower * size, upper = patch.data_upper * size, pixel = patch.data_pixel * size;
+  glUniform4f(locations[u_extent], lower.x, lower.y, upper.x, upper.y);
+  glUniform2f(locations[u_pixel], pixel.x, pixel.y);
   glUniform3f(locations[u_adjust], patch.opacity, patch.gamma, patch.multiplier);
   if (is_mask) {  // drawn where the image is, by the opacity of the layer
     glEnable(GL_BLEND);

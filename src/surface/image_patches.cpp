@@ -12,6 +12,7 @@
 #include <utility>
 
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "surface/control_grid.h"
 #include "surface/tile_grid.h"
@@ -19,16 +20,16 @@
 namespace tellurion::surface {
 namespace {
 
-/// The sides of a raster on which it ends in a point, a pole of its projection: nothing lies beyond them.
-struct ClosedSides {
-  bool top = false;
-  bool bottom = false;
-  /// Pixels beyond the other sides that repeat the border: without them two rasters that end on one line would both be half transparent
-  /// on it, and what lies below would show.
-  int kept = 0;
+/// Pixels of level 0 between which a raster ends. It does not where it goes round the body, or where it ends in a point, a pole of its
+/// projection: nothing lies beyond that.
+struct Extent {
+  glm::dvec2 lower{-INFINITY};
+  glm::dvec2 upper{INFINITY};
+
+  bool holds(glm::dvec2 pixel) const { return glm::all(glm::greaterThanEqual(pixel, lower)) && glm::all(glm::lessThanEqual(pixel, upper)); }
 };
 
-ClosedSides closed_sides(const source::RasterDescription& raster, source::RasterReader& reader) {
+Extent extent_of(const source::RasterDescription& raster, source::RasterReader& reader) {
   const source::LevelSize& size = raster.levels.front();
   const auto is_pole = [&](double y) {
     const std::array<glm::dvec2, 2> pixels{glm::dvec2(0.25 * size.width, y), glm::dvec2(0.75 * size.width, y)};
@@ -38,7 +39,14 @@ ClosedSides closed_sides(const source::RasterDescription& raster, source::Raster
     return std::all_of(places.begin(), places.end(),
                        [&](const geo::LatLon& p) { return std::cos(p.latitude.value) < 0.5 * step; });
   };
-  return {is_pole(0.0), is_pole(size.height), 0};
+  Extent extent;
+  if (!raster.wraps) {
+    extent.lower.x = 0.0;
+    extent.upper.x = size.width;
+  }
+  if (!is_pole(0.0)) extent.lower.y = 0.0;
+  if (!is_pole(size.height)) extent.upper.y = size.height;
+  return extent;
 }
 
 /// A window of a level, to be reduced by whole factors on each axis after reading.
@@ -115,25 +123,6 @@ raster::Image reduced(raster::Image image, glm::ivec2 factor) {
   return out;
 }
 
-/// Makes transparent what lies beyond the raster's borders, except where nothing can lie there.
-void clear_outside(raster::Image& image, const source::PixelWindow& window, const source::LevelSize& size, bool wraps,
-                   const ClosedSides& closed) {
-  for (int j = 0; j < window.height; ++j) {
-    const int y = window.y + j;
-    const bool row_outside = (y < -closed.kept && !closed.top) || (y >= size.height + closed.kept && !closed.bottom);
-    const auto row = image.rgba.begin() + static_cast<std::ptrdiff_t>(image.offset(0, j));
-    const auto clear = [&](int from, int to) {
-      if (from < to) std::fill(row + 4 * from, row + 4 * to, std::uint8_t{0});
-    };
-    if (row_outside) {
-      clear(0, window.width);
-    } else if (!wraps) {
-      clear(0, std::clamp(-closed.kept - window.x, 0, window.width));
-      clear(std::clamp(size.width + closed.kept - window.x, 0, window.width), window.width);
-    }
-  }
-}
-
 bool is_opaque(const raster::Image& image) {
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
     if (image.rgba[i] != 255) return false;
@@ -184,15 +173,13 @@ struct Window {
 };
 
 /// Empty if there is nothing to show.
-Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dvec2> pixels, glm::dvec2 pixels_per_texel,
-                           const ClosedSides& closed) {
+Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dvec2> pixels, glm::dvec2 pixels_per_texel) {
   const source::RasterDescription& about = raster.description();
   Window window;
   const std::optional<WindowChoice> choice = choose_window(about, pixels, pixels_per_texel);
   if (!choice) return window;
   Result<raster::Image> image = raster.read_colours(choice->level, choice->window);
   if (!image) return image.error();
-  clear_outside(*image, choice->window, about.levels[static_cast<std::size_t>(choice->level)], about.wraps, closed);
   window.image = reduced(std::move(*image), choice->reduction);
   const glm::dvec2 scale = source::level_scale(about, choice->level);
   window.first = glm::dvec2(choice->window.x, choice->window.y) / scale;
@@ -201,8 +188,8 @@ Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dve
 }
 
 /// Where the source's projection is smooth: the window itself, drawn through the control points.
-Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& grid, const ClosedSides& closed) {
-  Result<Window> window = read_window(raster, grid.pixels, grid.pixels_per_texel, closed);
+Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& grid, const Extent& extent) {
+  Result<Window> window = read_window(raster, grid.pixels, grid.pixels_per_texel);
   if (!window) return window.error();
   ImagePatch patch;
   patch.columns = grid.columns;
@@ -212,6 +199,13 @@ Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& 
   for (const glm::dvec2& pixel : grid.pixels) {
     patch.image_points.emplace_back((pixel - window->first) * window->scale / size);
   }
+  const auto limit = [&](glm::dvec2 pixel) {
+    return glm::vec2(glm::clamp((pixel - window->first) * window->scale / size, -double{kUnbounded}, double{kUnbounded}));
+  };
+  patch.data_lower = limit(extent.lower);
+  patch.data_upper = limit(extent.upper);
+  patch.data_pixel = window->scale / size;
+  patch.opaque = is_opaque(window->image) && std::ranges::all_of(grid.pixels, [&](const glm::dvec2& pixel) { return extent.holds(pixel); });
   patch.image = std::move(window->image);
   return patch;
 }
@@ -233,7 +227,7 @@ std::array<float, 4> sample(const raster::Image& image, glm::dvec2 at) {
 
 /// Where it is not: the texels themselves, each the mean of kPerTexel^2 places.
 Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
-                               const ClosedSides& closed) {
+                               const Extent& extent) {
   constexpr int kPerTexel = 2;
   const glm::ivec2 texels = glm::ivec2(grid.columns, grid.rows) * grid.cell_texels;
   const glm::ivec2 samples = texels * kPerTexel;
@@ -247,7 +241,7 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
   }
   std::vector<glm::dvec2> pixels(places.size());
   raster.reader().to_pixels(places, pixels);
-  const Result<Window> window = read_window(raster, pixels, grid.pixels_per_texel, closed);
+  const Result<Window> window = read_window(raster, pixels, grid.pixels_per_texel);
   if (!window) return window.error();
 
   ImagePatch patch;
@@ -261,10 +255,9 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
       std::array<float, 4> sum{};
       for (int i = 0; i < kPerTexel * kPerTexel; ++i) {
         const int x = column * kPerTexel + i % kPerTexel, y = row * kPerTexel + i / kPerTexel;
-        const glm::dvec2 at = (pixels[static_cast<std::size_t>(y * samples.x + x)] - window->first) * window->scale;
-        if (!std::isfinite(at.x) || !std::isfinite(at.y)) continue;
-        if (at.x < 0.0 || at.y < 0.0 || at.x > window->image.width || at.y > window->image.height) continue;
-        const std::array<float, 4> colour = sample(window->image, at);
+        const glm::dvec2 pixel = pixels[static_cast<std::size_t>(y * samples.x + x)];
+        if (!extent.holds(pixel)) continue;  // or NaN
+        const std::array<float, 4> colour = sample(window->image, (pixel - window->first) * window->scale);
         for (std::size_t c = 0; c < 4; ++c) sum[c] += colour[c];
       }
       for (const float channel : sum) {
@@ -272,15 +265,15 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
       }
     }
   }
+  patch.opaque = is_opaque(patch.image);
   return patch;
 }
 
 /// A patch without an image if there is nothing to show.
 Result<ImagePatch> make_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
-                              const ClosedSides& closed) {
-  Result<ImagePatch> patch = grid.follows ? window_patch(raster, grid, closed) : texel_patch(raster, key, grid, closed);
+                              const Extent& extent) {
+  Result<ImagePatch> patch = grid.follows ? window_patch(raster, grid, extent) : texel_patch(raster, key, grid, extent);
   if (!patch) return patch.error();
-  patch->opaque = is_opaque(patch->image);
   patch->lower = glm::vec2(grid.lower);
   patch->upper = glm::vec2(grid.upper);
   return patch;
@@ -348,12 +341,11 @@ class Composition {
   Result<void> add(const Layer& settings, std::uint32_t source_id, cache::CachedRaster& raster) {
     source::RasterReader& reader = raster.reader();
     const SlotMapping mapping = map_slot(world_, key_, raster.description(), reader);
-    ClosedSides closed = closed_sides(raster.description(), reader);
-    if (settings.catalogue || !raster.description().wraps) closed.kept = 1;  // what goes all round has no neighbours
+    const Extent extent = extent_of(raster.description(), reader);
     bool hides_all_below = mapping.whole;
     for (const ControlGrid& grid : mapping.grids) {
       if (stop_.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key_)};
-      Result<ImagePatch> patch = make_patch(raster, key_, grid, closed);
+      Result<ImagePatch> patch = make_patch(raster, key_, grid, extent);
       if (!patch && patch.error().code == ErrorCode::pending) {
         pending_ = true;  // taken for opaque: what lies below is asked for once it shows
         continue;

@@ -115,6 +115,8 @@ struct TileGeometry {
 enum class ImageUse : std::uint8_t { colour, grayscale, night, water, overlay };
 inline constexpr std::size_t kImageUses = 5;
 
+inline constexpr float kUnbounded = 1e4f;  ///< as a limit of texture coordinates: none
+
 /// A piece of a source image to be drawn into a tile's colour slot, lowest layer first.
 /// The control points form a grid of (columns + 1) x (rows + 1) over the slot's tile coordinates from `lower` to `upper`.
 struct ImagePatch {
@@ -124,6 +126,11 @@ struct ImagePatch {
   glm::vec2 lower{0.0f};                ///< tile coordinates st of the first control point
   glm::vec2 upper{1.0f};
   std::vector<glm::vec2> image_points;  ///< texture coordinates in `image` ([0, 1] = whole window), row by row
+  /// Texture coordinates between which the raster has pixels. Its border is repeated beyond them and fades out over one of its pixels, or
+  /// one texel of the slot if that is larger: two rasters that end on one line leave no gap and no step.
+  glm::vec2 data_lower{-kUnbounded};
+  glm::vec2 data_upper{kUnbounded};
+  glm::vec2 data_pixel{0.0f};           ///< size of the raster's pixels there
   bool opaque = false;                  ///< covers its whole rectangle with alpha 1
   bool linear = true;                   ///< bilinear filtering; else nearest
   float opacity = 1.0f;

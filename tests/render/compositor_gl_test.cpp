@@ -182,6 +182,38 @@ TEST_CASE("compose: a bent patch agrees with bilinear sampling in double precisi
   }
 }
 
+TEST_CASE("compose: of an image that is finer than the slot, the mean under a texel is shown") {
+  // Columns of black and white, two a texel of the slot: interpolated at one place they would be black, grey or white by where that lies.
+  Bench bench(gpu::Api::core);
+  for (const double shift : {0.0, 0.25, 0.5}) {
+    ImagePatch patch = plain_patch({0, 0, 0, 255}, true, kAllLower, kAllUpper);
+    patch.image = {600, 4, {}};
+    for (int i = 0; i < 600 * 4; ++i) {
+      for (int channel = 0; channel < 3; ++channel) patch.image.rgba.push_back(i % 2 ? 255 : 0);
+      patch.image.rgba.push_back(255);
+    }
+    const auto left = static_cast<float>((20.0 + shift) / 600.0), right = static_cast<float>(left + 2.0 * 1.2 * kInner / 600.0);
+    patch.image_points = {{left, 0.4f}, {right, 0.4f}, {left, 0.6f}, {right, 0.6f}};
+    const auto texels = bench.compose({patch});
+    for (int column = 1; column < kSide - 1; ++column) CHECK(near(texel(texels, column, 100), {128, 128, 128, 255}, 2));
+  }
+}
+
+TEST_CASE("compose: beyond a raster's border its last pixel fades over one pixel, or over a texel if that is larger") {
+  Bench bench(gpu::Api::core);
+  for (const double pixel : {0.25, 8.0}) {  // texels of the slot
+    ImagePatch patch = plain_patch({200, 100, 50, 255}, false, glm::vec2(0.0f), glm::vec2(1.0f));
+    patch.data_upper = {0.5f, surface::kUnbounded};
+    patch.data_pixel = glm::vec2(static_cast<float>(pixel / kInner));
+    const auto texels = bench.compose({patch});
+    for (int column = surface::kColourGutter; column < kSide - surface::kColourGutter; ++column) {
+      const double beyond = column + 0.5 - surface::kColourGutter - 0.5 * kInner;
+      const double alpha = 255.0 * (1.0 - std::clamp(beyond / std::max(pixel, 1.0), 0.0, 1.0));
+      CHECK(std::abs(texel(texels, column, 100)[3] - alpha) <= 1.0);
+    }
+  }
+}
+
 TEST_CASE("compose: a translucent patch over an opaque one adds up as premultiplied colours do") {
   Bench bench(gpu::Api::core);
   const ImagePatch below = bent_patch(256, 256, true);

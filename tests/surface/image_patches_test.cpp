@@ -54,8 +54,8 @@ glm::dvec4 sampled(const raster::Image& image, glm::dvec2 at) {
   return sum;
 }
 
-/// What a patch draws at tile coordinates; nothing outside of it.
-std::optional<glm::dvec4> drawn(const ImagePatch& patch, glm::dvec2 st) {
+/// Where tile coordinates lie in a patch's image; nothing outside of the patch.
+std::optional<glm::dvec2> image_place(const ImagePatch& patch, glm::dvec2 st) {
   const glm::dvec2 at = (st - glm::dvec2(patch.lower)) / glm::dvec2(patch.upper - patch.lower) * glm::dvec2(patch.columns, patch.rows);
   if (at.x < 0 || at.y < 0 || at.x > patch.columns || at.y > patch.rows) return std::nullopt;
   const int column = std::min(static_cast<int>(at.x), patch.columns - 1), row = std::min(static_cast<int>(at.y), patch.rows - 1);
@@ -63,7 +63,22 @@ std::optional<glm::dvec4> drawn(const ImagePatch& patch, glm::dvec2 st) {
   const auto point = [&](int x, int y) { return glm::dvec2(patch.image_points[static_cast<std::size_t>(y * (patch.columns + 1) + x)]); };
   const glm::dvec2 upper = glm::mix(point(column, row), point(column + 1, row), share.x);
   const glm::dvec2 lower = glm::mix(point(column, row + 1), point(column + 1, row + 1), share.x);
-  return sampled(patch.image, glm::mix(upper, lower, share.y));
+  return glm::mix(upper, lower, share.y);
+}
+
+/// What a patch draws at tile coordinates; nothing outside of it.
+std::optional<glm::dvec4> drawn(const ImagePatch& patch, glm::dvec2 st) {
+  const auto place = image_place(patch, st);
+  if (!place) return std::nullopt;
+  const double texel = 1.0 / (kColourSlotSide - 2 * kColourGutter);
+  glm::dvec2 step(0);
+  for (const glm::dvec2 way : {glm::dvec2(texel, 0), glm::dvec2(0, texel)}) {
+    auto next = image_place(patch, st + way);
+    if (!next) next = image_place(patch, st - way);
+    if (next) step += (*next - *place) * (*next - *place);
+  }
+  const glm::dvec2 beyond = glm::max(glm::dvec2(patch.data_lower) - *place, *place - glm::dvec2(patch.data_upper)) / glm::max(glm::max(glm::sqrt(step), glm::dvec2(patch.data_pixel)), 1e-12);
+  return (1.0 - std::clamp(std::max(beyond.x, beyond.y), 0.0, 1.0)) * sampled(patch.image, *place);
 }
 
 /// A slot after all patches, each over the ones before.
@@ -255,8 +270,10 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
       const geo::TileKey key = geo::tile_at(geo::normal_at(at(lat, lon)), level);
       CAPTURE(geo::to_string(key));
       const TileImagery imagery = pictures.of(key);
-      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger.
-      const double blur = std::max(0.02, to_degrees(geo::tile_angle(level)).value / 248) * 4;
+      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger; beyond the border it fades over one of the
+      // source or a texel, which measures up to 1.7 times its nominal size in longitude.
+      const double texel = to_degrees(geo::tile_angle(level)).value / 248;
+      const double blur = std::max(0.02, texel) * 4;
       for (int i = 0; i < 2000; ++i) {
         const glm::dvec2 st = slot_st(share(random), share(random));
         const geo::LatLon place = geo::place_of_normal(geo::tile_normal(key, st));
@@ -264,10 +281,10 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
         const double within = std::min({latitude - 40, 50 - latitude, longitude - 10, 20 - longitude});
         const double from_void = std::max(std::abs(latitude - 45), std::abs(longitude - 15));
         const glm::dvec4 colour = composed(imagery, st);
-        if (within < -blur) {
+        if (within < -std::max(0.02, 2 * texel)) {
           REQUIRE(colour == glm::dvec4(0));
           ++outside;
-        } else if (within > blur && from_void > 0.2 + blur) {
+        } else if (within > 0 && from_void > 0.2 + blur) {
           REQUIRE(glm::distance(colour, glm::dvec4(200, 100, 50, 255)) < 1.01);
           ++inside;
         } else if (from_void < 0.18 - blur) {
