@@ -19,6 +19,7 @@ namespace {
 
 constexpr float kFontSize = 15.0f;
 constexpr float kMargin = 10.0f;
+constexpr float kBelowToolbar = 42.0f;
 const ImVec4 kAccent{0.33f, 0.62f, 0.86f, 1.0f};
 constexpr ImGuiWindowFlags kOverlay = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                                       ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
@@ -152,8 +153,8 @@ Asked Panels::draw(globe::Globe& globe, const globe::FrameStats& stats, const Mo
   if (state.shown.layers) layers(globe, state, asked);
   if (state.shown.settings) settings(state);
   if (state.shown.help) help(state.shown.help);
-  if (state.shown.hints) hints(globe, state.shown.hints);
   activity(moment);
+  if (state.shown.hints) hints(globe, state.shown.hints);
   status_line(globe, stats, moment);
   ImGui::Render();
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
@@ -173,6 +174,7 @@ void Panels::toolbar(ViewerState& state, Asked& asked) {
   ImGui::SameLine();
   if (ImGui::Button("North")) asked.command = Command::north_up;
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("N");
+  toolbar_right_ = ImGui::GetWindowPos().x + ImGui::GetWindowWidth();
   ImGui::End();
   ImGui::PopStyleVar();
 }
@@ -209,7 +211,7 @@ void Panels::help(bool& shown) {
 void Panels::hints(const globe::Globe& globe, bool& shown) {
   const auto sentences = globe.hints();
   if (sentences.empty()) return;
-  anchor(0.5f, 0.0f, 52.0f);
+  anchor(0.5f, 0.0f, std::max(kBelowToolbar, activity_bottom_));
   ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, {640.0f, 300.0f});
   ImGui::Begin("hints", nullptr, kOverlay);
   for (const std::string& sentence : sentences) {
@@ -222,14 +224,18 @@ void Panels::hints(const globe::Globe& globe, bool& shown) {
 }
 
 void Panels::activity(const Moment& moment) {
+  activity_bottom_ = 0.0f;
   if (!moment.recording && !moment.replaying && moment.notice.empty()) return;
-  anchor(1.0f, 0.0f);
+  const float wrap = 0.6f * ImGui::GetIO().DisplaySize.x;
+  const float width = ImGui::CalcTextSize(moment.notice.c_str(), nullptr, false, wrap).x + 4 * kMargin;
+  anchor(1.0f, 0.0f, toolbar_right_ + width > ImGui::GetIO().DisplaySize.x ? kBelowToolbar : 0.0f);
   ImGui::Begin("activity", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
   if (moment.recording) ImGui::TextColored({1.0f, 0.35f, 0.30f, 1.0f}, "recording (K stops)");
   if (moment.replaying) ImGui::TextColored(kAccent, "replaying (J stops)");
-  ImGui::PushTextWrapPos(0.6f * ImGui::GetIO().DisplaySize.x);
+  ImGui::PushTextWrapPos(wrap);
   if (!moment.notice.empty()) ImGui::TextUnformatted(moment.notice.c_str());
   ImGui::PopTextWrapPos();
+  activity_bottom_ = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   ImGui::End();
 }
 

@@ -50,6 +50,8 @@ class Panels {
   std::array<float, kGraphFrames> frame_ms_{};  ///< a ring
   std::size_t next_frame_ = 0;
   Rate fetched_;  ///< bytes over the network
+  float toolbar_right_ = 0;    ///< where the toolbar ends, and where what is told in the other corner does
+  float activity_bottom_ = 0;
 };
 
 }  // namespace tellurion::apps

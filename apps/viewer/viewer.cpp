@@ -94,7 +94,7 @@ void Viewer::run() {
     if (input_.take_activity()) frames_owed_ = kSettlingFrames;
     take_done(now);
     if (picture_changes(now)) frame(now, std::min(now - last, kLongestStep));
-    else if (shown_complete_) view_->prepare_switches(state_.view);
+    else if (shown_complete_ && now >= draw_until_) view_->prepare_switches(state_.view);
     recorder_.note(now, view::pose_of(globe_->ellipsoid(), navigation_->camera()));
     last = now;
   }
