@@ -199,6 +199,27 @@ TEST_CASE("layers that are added and removed while they are shown look as if the
   });
 }
 
+TEST_CASE("a picture that comes and goes has no tile made anew that it does not touch") {
+  const Files files;
+  MadeRaster antipodes = made(-165, GDT_Byte, {waves(0, 180, 60), waves(1, 80, 60), waves(2, 80, 60)});
+  (*antipodes.transform)[3] = -20;
+  const MadeFile far{"far.tif", antipodes};
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  Show show(**thread, world_of(files), 2);
+  const auto before = show.finished_picture();
+  const auto requests = show.view->stats().requests;
+  const std::size_t added = show.globe->add_layer(layer_of(far, LayerGroup::color)).value();
+  CHECK((show.finished_picture() == before));
+  CHECK(show.view->stats().requests == requests);
+  REQUIRE(show.globe->remove_layer(added).has_value());
+  CHECK((show.finished_picture() == before));
+  CHECK(show.view->stats().requests == requests);
+  REQUIRE(show.globe->add_layer(layer_of(files.blue, LayerGroup::color)).has_value());
+  CHECK((show.finished_picture() != before));
+  CHECK(show.view->stats().requests > requests);
+}
+
 TEST_CASE("a layer that comes, goes and changes before it is open leaves no trace") {
   const Files files;
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
