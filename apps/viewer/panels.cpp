@@ -174,7 +174,6 @@ void Panels::toolbar(ViewerState& state, Asked& asked) {
   ImGui::SameLine();
   if (ImGui::Button("North")) asked.command = Command::north_up;
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("N");
-  toolbar_right_ = ImGui::GetWindowPos().x + ImGui::GetWindowWidth();
   ImGui::End();
   ImGui::PopStyleVar();
 }
@@ -226,9 +225,9 @@ void Panels::hints(const globe::Globe& globe, bool& shown) {
 void Panels::activity(const Moment& moment) {
   activity_bottom_ = 0.0f;
   if (!moment.recording && !moment.replaying && moment.notice.empty()) return;
-  const float wrap = 0.6f * ImGui::GetIO().DisplaySize.x;
-  const float width = ImGui::CalcTextSize(moment.notice.c_str(), nullptr, false, wrap).x + 4 * kMargin;
-  anchor(1.0f, 0.0f, toolbar_right_ + width > ImGui::GetIO().DisplaySize.x ? kBelowToolbar : 0.0f);
+  const float wrap = 0.8f * ImGui::GetIO().DisplaySize.x;
+  const bool is_one_line = ImGui::CalcTextSize(moment.notice.c_str(), nullptr, false, wrap).y < 1.5f * ImGui::GetTextLineHeight();
+  anchor(1.0f, 0.0f, is_one_line ? 0.0f : kBelowToolbar);
   ImGui::Begin("activity", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
   if (moment.recording) ImGui::TextColored({1.0f, 0.35f, 0.30f, 1.0f}, "recording (K stops)");
   if (moment.replaying) ImGui::TextColored(kAccent, "replaying (J stops)");

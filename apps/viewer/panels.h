@@ -50,8 +50,7 @@ class Panels {
   std::array<float, kGraphFrames> frame_ms_{};  ///< a ring
   std::size_t next_frame_ = 0;
   Rate fetched_;  ///< bytes over the network
-  float toolbar_right_ = 0;    ///< where the toolbar ends, and where what is told in the other corner does
-  float activity_bottom_ = 0;
+  float activity_bottom_ = 0;  ///< where what is told in the upper right corner ends
 };
 
 }  // namespace tellurion::apps

@@ -297,12 +297,14 @@ void Globe::State::show(std::shared_ptr<const surface::SurfaceDescription> chang
     other_facts.clear();
   }
   if (!begun) return;
-  pool->submit_background([begun = std::weak_ptr(begun), scan = options.scan_heights](int) {
+  const WorkerPool::Job load = [begun = std::weak_ptr(begun), scan = options.scan_heights](int) {
     const auto still_wanted = begun.lock();
     if (!still_wanted) return;  // heights have changed again
     still_wanted->load(scan);
     still_wanted->begin_scan();
-  });
+  };
+  // Soon: until it is there, finer tiles are built than are needed.
+  if (!pool->try_submit(load)) pool->submit_background(load);
 }
 
 /// Error tables for the heights as they are now. With the lock held.

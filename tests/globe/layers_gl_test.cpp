@@ -318,6 +318,21 @@ TEST_CASE("add_layer, remove_layer and add_data: what cannot be is said") {
   }
 }
 
+TEST_CASE("add_data: what lies on another body is no layer of this one") {
+  const Files files;
+  World mars;
+  mars.planet = "Mars";
+  mars.ellipsoid = geo::kMars;
+  GlobeOptions options;
+  options.workers = 0;
+  auto globe = std::move(*Globe::open(mars, options));
+  std::string told;
+  globe->add_data({files.red.path()}, [&](const std::vector<AddedData>& all) { told = all.front().layer.error().message; });
+  REQUIRE(globe->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience));
+  CHECK(told.ends_with("lies on Earth, but this is a world of Mars"));
+  CHECK(globe->layer_order().empty());
+}
+
 TEST_CASE("save_layers: settings and order come into the world's file, which else stays as it is, or into a new one") {
   const Files files;
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("tellurion-layers-{}", ::getpid());
