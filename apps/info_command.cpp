@@ -72,7 +72,7 @@ struct InfoOptions : Options {
 };
 
 /// Over the whole globe as it is by day, each raster that does not go round it.
-Result<void> draw_picture(const InfoOptions& options, globe::World world, const std::vector<globe::LayerInfo>& told) {
+Result<void> draw_picture(const InfoOptions& options, globe::World world, const globe::Globe& told) {
   auto footprints = globe::with_footprints(std::move(world), told);
   if (!footprints) return footprints.error();
   globe::GlobeOptions globe_options;
@@ -114,8 +114,8 @@ int info(const InfoOptions& options) {
   const globe::World& w = (*globe)->world();
   fmt::print("planet {}: {:.3f} x {:.3f} m\n", w.planet, w.ellipsoid.a(), w.ellipsoid.b());
   (void)(*globe)->wait_for_catalogues(std::chrono::steady_clock::time_point::max());
-  for (std::size_t i = 0; i < (*globe)->layers().size(); ++i) {
-    const globe::LayerInfo& layer = (*globe)->layers()[i];
+  for (std::size_t i = 0; i < (*globe)->layer_count(); ++i) {
+    const globe::LayerInfo& layer = (*globe)->layer(i);
     fmt::print("layer {} ({}){}\n", layer.spec.name, name_of(layer.spec.group), layer.spec.enabled ? "" : ", off");
     if (layer.raster) {
       print_raster(layer.raster->description());
@@ -130,7 +130,7 @@ int info(const InfoOptions& options) {
   for (const std::string& hint : (*globe)->hints()) fmt::print(stderr, "tellurion: {}\n", hint);
   for (const std::string& problem : (*globe)->problems()) fmt::print(stderr, "tellurion: {}\n", problem);
   if (!options.picture.empty()) {
-    if (const auto drawn = draw_picture(options, shown, (*globe)->layers()); !drawn) return report(drawn.error());
+    if (const auto drawn = draw_picture(options, shown, **globe); !drawn) return report(drawn.error());
   }
   return (*globe)->data_missing() ? kDataMissing : kDone;
 }

@@ -137,7 +137,10 @@ int prefetch(const PrefetchOptions& options) {
   auto globe = open_globe(options, RenderThreadUse::waits);
   if (!globe) return report(globe.error());
   bool remote = false;
-  for (const auto& layer : (*globe)->layers()) remote = remote || (layer.raster && layer.raster->description().is_remote);
+  for (std::size_t i = 0; i < (*globe)->layer_count(); ++i) {
+    const auto& raster = (*globe)->layer(i).raster;
+    remote = remote || (raster && raster->description().is_remote);
+  }
   if (!remote) {
     const bool missing = (*globe)->data_missing();
     fmt::print("no layer of this world {}comes over a network\n", missing ? "that could be opened " : "");

@@ -68,9 +68,9 @@ Result<std::size_t> find_layer(const globe::World& world, const std::string& wor
 
 Result<void> add_layers(globe::WorldText& text, const std::vector<globe::World>& data, const WorldOptions& options) {
   for (const globe::World& one : data) {
-    if (one.planet != text.world().planet && !(one.ellipsoid == text.world().ellipsoid))
-      return {ErrorCode::invalid_argument, fmt::format("{} lies on {}, but {} is a world of {}", one.layers.front().name, one.planet, options.world, text.world().planet)};
-    globe::LayerSpec layer = one.layers.front();
+    auto found = globe::layer_for(text.world(), one);
+    if (!found) return found.error();
+    globe::LayerSpec layer = std::move(*found);
     if (!options.name.empty()) layer.name = options.name;
     if (const auto group = globe::group_by_name(options.group)) layer.group = *group;
     if (options.opacity) layer.opacity = *options.opacity;

@@ -38,6 +38,7 @@ constexpr std::array kGestures{
     Gesture{"double click", "fly to the place"},
     Gesture{"arrows, W A S D", "move, faster when high"},
     Gesture{"Q, E", "down, up"},
+    Gesture{"files dropped here", "become layers on top"},
 };
 
 }  // namespace

@@ -70,6 +70,7 @@ Input::Input(const Window& window) : window_(window) {
     Input& self = of(w);
     self.reports_.emplace_back(Wheel{steps, self.cursor()});
   });
+  glfwSetDropCallback(handle, [](GLFWwindow* w, int count, const char** paths) { of(w).reports_.emplace_back(Drop{{paths, paths + count}}); });
   glfwSetKeyCallback(handle, [](GLFWwindow* w, int key, int, int action, int) { of(w).on_key(key, action); });
   glfwSetCharCallback(handle, [](GLFWwindow* w, unsigned character) { of(w).on_character(character); });
   glfwSetCursorEnterCallback(handle, [](GLFWwindow* w, int) { of(w); });
@@ -83,6 +84,7 @@ Input::~Input() {
   glfwSetMouseButtonCallback(handle, nullptr);
   glfwSetCursorPosCallback(handle, nullptr);
   glfwSetScrollCallback(handle, nullptr);
+  glfwSetDropCallback(handle, nullptr);
   glfwSetKeyCallback(handle, nullptr);
   glfwSetCharCallback(handle, nullptr);
   glfwSetCursorEnterCallback(handle, nullptr);
@@ -147,6 +149,8 @@ std::vector<Event> Input::take_events(bool mouse_taken, bool keyboard_taken) {
       events.emplace_back(*move);
     } else if (const auto* wheel = std::get_if<Wheel>(&report)) {
       if (!mouse_taken) events.emplace_back(*wheel);
+    } else if (const auto* drop = std::get_if<Drop>(&report)) {
+      events.emplace_back(*drop);
     } else if (!keyboard_taken) {
       events.emplace_back(std::get<Command>(report));
     }

@@ -3,6 +3,7 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -33,7 +34,11 @@ struct Wheel {
 struct DoubleClick {
   glm::dvec2 at;
 };
-using Event = std::variant<DragStart, CursorMove, DragEnd, Wheel, DoubleClick, Command>;
+/// Files and folders that were dropped on the window.
+struct Drop {
+  std::vector<std::string> paths;
+};
+using Event = std::variant<DragStart, CursorMove, DragEnd, Wheel, DoubleClick, Drop, Command>;
 
 class Input {
  public:
@@ -70,7 +75,7 @@ class Input {
     int button;
     glm::dvec2 at;
   };
-  using Report = std::variant<Press, Release, CursorMove, Wheel, Command>;
+  using Report = std::variant<Press, Release, CursorMove, Wheel, Drop, Command>;
 
   static Input& of(GLFWwindow* window);
   void on_key(int key, int action);

@@ -30,11 +30,6 @@ std::string text_of_place(const geo::LatLon& place) {
                      std::abs(longitude), longitude < 0 ? 'W' : 'E');
 }
 
-std::shared_ptr<const source::RasterSource> raster_of(const globe::Globe& globe, std::size_t layer) {
-  const globe::LayerInfo& info = globe.layers()[layer];
-  return info.raster || info.spec.source.time ? info.raster : globe.raster_at(layer, {});  // those without times open nothing
-}
-
 double Rate::of(double figure, std::chrono::steady_clock::time_point now) {
   while (!looks_.empty() && now - looks_.front().when > std::chrono::seconds(2)) looks_.pop_front();
   if (looks_.empty() || now - looks_.back().when >= std::chrono::milliseconds(50)) looks_.push_back({now, figure});

@@ -18,9 +18,6 @@ std::string text_of_metres(double metres);
 /// "46.5000 N  8.0000 E".
 std::string text_of_place(const geo::LatLon& place);
 
-/// What a layer shows, if it is open.
-std::shared_ptr<const source::RasterSource> raster_of(const globe::Globe& globe, std::size_t layer);
-
 /// How fast a figure grows, over the last two seconds. For figures that are looked at now and then.
 class Rate {
  public:

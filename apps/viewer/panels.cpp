@@ -19,6 +19,7 @@ namespace {
 
 constexpr float kFontSize = 15.0f;
 constexpr float kMargin = 10.0f;
+constexpr float kBelowToolbar = 42.0f;
 const ImVec4 kAccent{0.33f, 0.62f, 0.86f, 1.0f};
 constexpr ImGuiWindowFlags kOverlay = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                                       ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
@@ -85,10 +86,10 @@ void switch_button(const char* label, const char* tip, bool& on) {
 std::vector<std::string> attributions(const globe::Globe& globe) {
   std::vector<std::string> lines;
   std::string names;
-  for (std::size_t i = 0; i < globe.layers().size(); ++i) {
+  for (std::size_t i = 0; i < globe.layer_count(); ++i) {
     if (!globe.layer_settings(i).enabled) continue;
-    const globe::LayerSpec& spec = globe.layers()[i].spec;
-    const auto raster = raster_of(globe, i);
+    const globe::LayerSpec& spec = globe.layer(i).spec;
+    const auto raster = globe.shown_raster(i);
     std::string credit = spec.attribution;
     if (credit.empty() && raster) credit = raster->description().attribution;
     if (credit.empty()) names += (names.empty() ? "" : " \xC2\xB7 ") + spec.name;
@@ -143,25 +144,24 @@ void Panels::begin() {
 bool Panels::take_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
 bool Panels::take_keyboard() const { return ImGui::GetIO().WantCaptureKeyboard; }
 
-std::optional<Command> Panels::draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
-                                    ViewerState& state) {
+Asked Panels::draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment, ViewerState& state) {
   frame_ms_[next_frame_] = static_cast<float>(stats.frame_ms);
   next_frame_ = (next_frame_ + 1) % kGraphFrames;
-  std::optional<Command> command;
-  toolbar(state, command);
+  Asked asked;
+  toolbar(state, asked);
   if (state.shown.statistics) statistics(globe, stats, state.shown.statistics);
-  if (state.shown.layers) layers(globe, state, command);
+  if (state.shown.layers) layers(globe, state, asked);
   if (state.shown.settings) settings(state);
   if (state.shown.help) help(state.shown.help);
-  if (state.shown.hints) hints(globe, state.shown.hints);
   activity(moment);
+  if (state.shown.hints) hints(globe, state.shown.hints);
   status_line(globe, stats, moment);
   ImGui::Render();
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-  return command;
+  return asked;
 }
 
-void Panels::toolbar(ViewerState& state, std::optional<Command>& command) {
+void Panels::toolbar(ViewerState& state, Asked& asked) {
   anchor(0.0f, 0.0f);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {6.0f, 6.0f});
   ImGui::Begin("toolbar", nullptr, kOverlay);
@@ -169,10 +169,10 @@ void Panels::toolbar(ViewerState& state, std::optional<Command>& command) {
   switch_button("Statistics", "F2", state.shown.statistics);
   switch_button("Layers", "F3", state.shown.layers);
   switch_button("Settings", "F4", state.shown.settings);
-  if (ImGui::Button("Home")) command = Command::home;
+  if (ImGui::Button("Home")) asked.command = Command::home;
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("H");
   ImGui::SameLine();
-  if (ImGui::Button("North")) command = Command::north_up;
+  if (ImGui::Button("North")) asked.command = Command::north_up;
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("N");
   ImGui::End();
   ImGui::PopStyleVar();
@@ -210,7 +210,7 @@ void Panels::help(bool& shown) {
 void Panels::hints(const globe::Globe& globe, bool& shown) {
   const auto sentences = globe.hints();
   if (sentences.empty()) return;
-  anchor(0.5f, 0.0f, 52.0f);
+  anchor(0.5f, 0.0f, std::max(kBelowToolbar, activity_bottom_));
   ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, {640.0f, 300.0f});
   ImGui::Begin("hints", nullptr, kOverlay);
   for (const std::string& sentence : sentences) {
@@ -223,12 +223,18 @@ void Panels::hints(const globe::Globe& globe, bool& shown) {
 }
 
 void Panels::activity(const Moment& moment) {
+  activity_bottom_ = 0.0f;
   if (!moment.recording && !moment.replaying && moment.notice.empty()) return;
-  anchor(1.0f, 0.0f);
+  const float wrap = 0.8f * ImGui::GetIO().DisplaySize.x;
+  const bool is_one_line = ImGui::CalcTextSize(moment.notice.c_str(), nullptr, false, wrap).y < 1.5f * ImGui::GetTextLineHeight();
+  anchor(1.0f, 0.0f, is_one_line ? 0.0f : kBelowToolbar);
   ImGui::Begin("activity", nullptr, kOverlay | ImGuiWindowFlags_NoInputs);
   if (moment.recording) ImGui::TextColored({1.0f, 0.35f, 0.30f, 1.0f}, "recording (K stops)");
   if (moment.replaying) ImGui::TextColored(kAccent, "replaying (J stops)");
+  ImGui::PushTextWrapPos(wrap);
   if (!moment.notice.empty()) ImGui::TextUnformatted(moment.notice.c_str());
+  ImGui::PopTextWrapPos();
+  activity_bottom_ = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   ImGui::End();
 }
 

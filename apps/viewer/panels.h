@@ -13,6 +13,12 @@ namespace tellurion::apps {
 
 class Window;
 
+/// What the user asks for at the panels.
+struct Asked {
+  std::optional<Command> command;               ///< of a button that was pressed
+  std::optional<std::size_t> fly_to;            ///< a layer
+};
+
 class Panels {
  public:
   /// Sets up Dear ImGui for `window`, which outlives this.
@@ -27,15 +33,13 @@ class Panels {
   bool take_keyboard() const;
 
   /// Lays out the panels, draws them over the picture and changes `state` and the globe's layers as the user asks.
-  /// Gives the command of a button that was pressed.
-  std::optional<Command> draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment,
-                              ViewerState& state);
+  Asked draw(globe::Globe& globe, const globe::FrameStats& stats, const Moment& moment, ViewerState& state);
 
  private:
-  void toolbar(ViewerState& state, std::optional<Command>& command);
+  void toolbar(ViewerState& state, Asked& asked);
   void statistics(const globe::Globe& globe, const globe::FrameStats& stats, bool& shown);
   void loader(const globe::Globe& globe);
-  void layers(globe::Globe& globe, ViewerState& state, std::optional<Command>& command);
+  void layers(globe::Globe& globe, ViewerState& state, Asked& asked);
   void settings(ViewerState& state);
   void help(bool& shown);
   void hints(const globe::Globe& globe, bool& shown);
@@ -46,6 +50,7 @@ class Panels {
   std::array<float, kGraphFrames> frame_ms_{};  ///< a ring
   std::size_t next_frame_ = 0;
   Rate fetched_;  ///< bytes over the network
+  float activity_bottom_ = 0;  ///< where what is told in the upper right corner ends
 };
 
 }  // namespace tellurion::apps

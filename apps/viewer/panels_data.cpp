@@ -87,8 +87,8 @@ void layer_details(const globe::LayerInfo& layer, const LayerState& state) {
 }
 
 /// A layer's switch, place and settings.
-void layer_entry(globe::Globe& globe, std::size_t i, const LayerState& state, bool may_rise, bool may_sink) {
-  const globe::LayerInfo& layer = globe.layers()[i];
+void layer_entry(globe::Globe& globe, std::size_t i, const LayerState& state, bool may_rise, bool may_sink, Asked& asked) {
+  const globe::LayerInfo& layer = globe.layer(i);
   globe::LayerSettings settings = globe.layer_settings(i);
   bool changed = ImGui::Checkbox("##on", &settings.enabled);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("shown or not");
@@ -107,6 +107,11 @@ void layer_entry(globe::Globe& globe, std::size_t i, const LayerState& state, bo
   if (failed) ImGui::PopStyleColor();
   if (open) {
     changed |= settings_rows(settings, layer.spec.group);
+    if (ImGui::SmallButton("Fly to")) asked.fly_to = i;
+    ImGui::SameLine();
+    const bool removed = ImGui::SmallButton("Remove");
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("for this run; Save removes it from the world file");
+    if (removed) return (void)globe.remove_layer(i);
     layer_details(layer, state);
   }
   if (changed) (void)globe.set_layer(i, settings);  // the sliders keep to the ranges
@@ -116,9 +121,13 @@ void layer_entry(globe::Globe& globe, std::size_t i, const LayerState& state, bo
 
 /// What the network brings, and what each of its sources did; nothing where no layer needs it.
 void Panels::loader(const globe::Globe& globe) {
-  const auto& layers = globe.layers();
-  const auto is_remote = [](const globe::LayerInfo& layer) { return layer.raster && layer.raster->description().is_remote; };
-  if (std::none_of(layers.begin(), layers.end(), is_remote)) return;
+  std::vector<std::size_t> remote = globe.layer_order();
+  std::erase_if(remote, [&](std::size_t i) {
+    const auto raster = globe.shown_raster(i);
+    return !raster || !raster->description().is_remote;
+  });
+  if (remote.empty()) return;
+  std::ranges::sort(remote);
   ImGui::Separator();
   ImGui::TextDisabled("network");
   const fetch::FetchStats fetched = globe.fetch_stats();
@@ -130,9 +139,8 @@ void Panels::loader(const globe::Globe& globe) {
     table_row("bytes", fmt::format("{}, {}/s", text_of_bytes(static_cast<double>(fetched.bytes)), text_of_bytes(rate)));
     ImGui::EndTable();
   }
-  const auto stats = globe.source_stats();  // in the order of the layers
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    if (!is_remote(layers[i])) continue;
+  const auto stats = globe.source_stats();  // by number, of no fewer layers
+  for (const std::size_t i : remote) {
     const globe::SourceStats& s = stats[i];
     ImGui::TextWrapped("%s", s.name.c_str());
     ImGui::TextDisabled("%s", fmt::format("  {} reads, {}, {} errors", s.requests, text_of_bytes(static_cast<double>(s.bytes)), s.errors).c_str());
@@ -187,23 +195,23 @@ void Panels::statistics(const globe::Globe& globe, const globe::FrameStats& s, b
 }
 
 /// The uppermost first.
-void Panels::layers(globe::Globe& globe, ViewerState& state, std::optional<Command>& command) {
+void Panels::layers(globe::Globe& globe, ViewerState& state, Asked& asked) {
   const ImVec2 display = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({10.0f, 52.0f}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSize({kLayersWidth, std::min(520.0f, display.y - 110.0f)}, ImGuiCond_FirstUseEver);
   if (ImGui::Begin("Layers", &state.shown.layers, ImGuiWindowFlags_NoCollapse)) {
-    const auto stats = globe.source_stats();  // in the order of the layers
+    const std::vector<std::size_t> order = globe.layer_order();
+    const auto stats = globe.source_stats();  // by number, of no fewer layers
     ImGui::TextUnformatted(globe.world().planet.c_str());
     ImGui::SameLine();
-    if (ImGui::SmallButton("Save")) command = Command::save_layers;
-    if (!globe.world().file.empty()) ImGui::TextDisabled("%s", globe.world().file.string().c_str());
-    const std::vector<std::size_t> order = globe.layer_order();
-    const auto same_group = [&](std::size_t a, std::size_t b) { return b < order.size() && globe.layers()[order[a]].spec.group == globe.layers()[order[b]].spec.group; };
+    if (ImGui::SmallButton("Save")) asked.command = Command::save_layers;
+    if (const auto file = globe.kept_layers().file; !file.empty()) ImGui::TextDisabled("%s", file.string().c_str());
+    const auto same_group = [&](std::size_t a, std::size_t b) { return b < order.size() && globe.layer(order[a]).spec.group == globe.layer(order[b]).spec.group; };
     for (std::size_t n = order.size(); n-- > 0;) {
       const std::size_t i = order[n];
       ImGui::PushID(static_cast<int>(i));
-      const LayerState now{stats[i], globe.step_of(i, state.view.time), globe::catalogue_facts(globe, i), raster_of(globe, i)};
-      layer_entry(globe, i, now, same_group(n, n + 1), n > 0 && same_group(n, n - 1));
+      const LayerState now{stats[i], globe.step_of(i, state.view.time), globe::catalogue_facts(globe, i), globe.shown_raster(i)};
+      layer_entry(globe, i, now, same_group(n, n + 1), n > 0 && same_group(n, n - 1), asked);
       ImGui::PopID();
     }
   }

@@ -16,6 +16,8 @@ constexpr double kRestSeconds = 0.5;
 constexpr double kLoadingRestSeconds = 0.01;
 constexpr double kLookBelowSeconds = 0.2;
 constexpr double kNoticeSeconds = 4.0;
+constexpr double kErrorSeconds = 12.0;
+constexpr std::size_t kMostErrors = 6;
 constexpr double kExaggerationStep = 1.189207115002721;  // four steps double
 constexpr double kSunStepSeconds = 24.0;                 // in which the sun moves by a tenth of a degree
 
@@ -81,6 +83,8 @@ Result<void> Viewer::open_logs() {
   return open(camera_log_, options_.camera_log, view::format_flight({}));
 }
 
+Viewer::~Viewer() { done_->close(); }
+
 void Viewer::run() {
   double last = seconds_now();
   while (!window_.should_close()) {
@@ -88,8 +92,9 @@ void Viewer::run() {
     const double now = seconds_now();
     advance_clock(now - last);
     if (input_.take_activity()) frames_owed_ = kSettlingFrames;
+    take_done(now);
     if (picture_changes(now)) frame(now, std::min(now - last, kLongestStep));
-    else if (shown_complete_) view_->prepare_switches(state_.view);
+    else if (shown_complete_ && now >= draw_until_) view_->prepare_switches(state_.view);
     recorder_.note(now, view::pose_of(globe_->ellipsoid(), navigation_->camera()));
     last = now;
   }
@@ -156,10 +161,11 @@ void Viewer::frame(double now, double seconds) {
   if (stats.bytes_uploaded != shown_bytes_) draw_until_ = now + kFadeSeconds;
   shown_bytes_ = stats.bytes_uploaded;
   shown_complete_ = stats.complete;
-  const auto command = panels_.draw(*globe_, stats, moment(now), state_);
+  const Asked asked = panels_.draw(*globe_, stats, moment(now), state_);
   window_.show_frame();
   write_logs(now);
-  if (command) obey(*command, now);
+  if (asked.command) obey(*asked.command, now);
+  if (asked.fly_to) fly_to(asked.fly_to);
   if (now >= notice_until_) notice_.clear();
   last_frame_ended_ = seconds_now();
 }
@@ -215,7 +221,7 @@ void Viewer::write_logs(double now) {
 
 void Viewer::handle(const std::vector<Event>& events, double now) {
   for (const Event& event : events) {
-    const bool moves_camera = !std::holds_alternative<Command>(event) && !std::holds_alternative<CursorMove>(event);
+    const bool moves_camera = !std::holds_alternative<Command>(event) && !std::holds_alternative<CursorMove>(event) && !std::holds_alternative<Drop>(event);
     if (moves_camera) recorder_.stop_replay();
     if (const auto* start = std::get_if<DragStart>(&event))
       navigation_->start_drag(*start, now);
@@ -227,6 +233,8 @@ void Viewer::handle(const std::vector<Event>& events, double now) {
       navigation_->wheel(*wheel, state_.motion);
     else if (const auto* click = std::get_if<DoubleClick>(&event))
       navigation_->approach(click->at, now);
+    else if (const auto* drop = std::get_if<Drop>(&event))
+      add(*drop);
     else
       obey(std::get<Command>(event), now);
   }
@@ -259,8 +267,7 @@ void Viewer::obey(Command command, double now) {
       navigation_->reset_tilt();
       break;
     case Command::home:
-      recorder_.stop_replay();
-      navigation_->fly_to(globe_->home(), now);
+      fly_to(std::nullopt);
       break;
     case Command::freeze:
       flip(view.frozen);
@@ -348,15 +355,65 @@ void Viewer::save_screenshot() {
   if (!written) report(written.error());
 }
 
-void Viewer::save_layers() {
-  const auto file = globe::save_layers(*globe_, {});
-  say(file ? fmt::format("layers saved in {}", file->string()) : file.error().message);
-  if (!file) report(file.error());
+void Viewer::say(const std::string& text) { say(text, kNoticeSeconds); }
+
+void Viewer::say(const std::string& text, double seconds) {
+  notice_ = text;
+  notice_until_ = seconds_now() + seconds;
 }
 
-void Viewer::say(const std::string& text) {
-  notice_ = text;
-  notice_until_ = seconds_now() + kNoticeSeconds;
+// --- What workers do for the user
+// --------------------------------------------------------------------------------------
+
+void Viewer::add(const Drop& drop) {
+  globe_->add_data(drop.paths, [done = done_, globe = globe_.get()](const std::vector<globe::AddedData>& added) {
+    Done what;
+    for (const globe::AddedData& one : added) {
+      if (one.layer) what.news = fmt::format("added {}", what.news.empty() ? globe->layer(*one.layer).spec.name : "layers");
+      else what.errors.push_back(one.layer.error());
+    }
+    done->push(std::move(what));
+    Window::wake();
+  });
+  shown_complete_ = false;
+  say(drop.paths.size() == 1 ? fmt::format("opening {}", drop.paths.front()) : fmt::format("opening {} files", drop.paths.size()), kErrorSeconds);
+}
+
+void Viewer::fly_to(std::optional<std::size_t> layer) {
+  recorder_.stop_replay();
+  have_done([globe = globe_.get(), layer] { return Done{{}, {}, layer ? globe->home(*layer) : globe->home()}; });
+}
+
+void Viewer::save_layers() {
+  have_done([globe = globe_.get()]() -> Done {
+    const auto file = globe::save_layers(*globe, {});
+    if (!file) return {{}, {file.error()}};
+    return {fmt::format("layers saved in {}", file->string()), {}};
+  });
+}
+
+void Viewer::have_done(std::function<Done()> work) {
+  const bool submitted = globe_->try_submit([done = done_, work = std::move(work)](globe::SurfaceWorker&) {
+    done->push(work());
+    Window::wake();
+  });
+  shown_complete_ = false;  // without threads, looking for what there is to draw runs it
+  if (!submitted) say("too much is being loaded: once more, please");
+}
+
+void Viewer::take_done(double now) {
+  while (auto done = done_->try_pop()) {
+    frames_owed_ = std::max(frames_owed_, kSettlingFrames);
+    shown_complete_ = false;
+    if (done->fly_to) navigation_->fly_to(*done->fly_to, now);
+    std::string text = done->news;
+    for (std::size_t i = 0; i < done->errors.size(); ++i) {
+      report(done->errors[i]);
+      if (i < kMostErrors) text += (text.empty() ? "" : "\n") + done->errors[i].message;
+      if (i == kMostErrors) text += fmt::format("\nand {} more cannot be shown", done->errors.size() - i);
+    }
+    if (!text.empty()) say(text, done->errors.empty() ? kNoticeSeconds : kErrorSeconds);
+  }
 }
 
 }  // namespace tellurion::apps

@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/bounded_queue.h"
 #include "globe/api.h"
 #include "options.h"
 #include "viewer/flight_recorder.h"
@@ -28,6 +30,7 @@ class Viewer {
  public:
   /// Opens the window and the world. Errors: of the window, the driver, the world.
   static Result<std::unique_ptr<Viewer>> open(const ViewerOptions& options);
+  ~Viewer();
 
   /// Runs until the window is closed.
   void run();
@@ -43,8 +46,21 @@ class Viewer {
   void toggle_recording(double now);
   void toggle_replay(double now);
   void save_screenshot();
+  void add(const Drop& drop);
+  void fly_to(std::optional<std::size_t> layer);
   void save_layers();
   void say(const std::string& text);
+  void say(const std::string& text, double seconds);
+
+  /// What a worker has done for the user.
+  struct Done {
+    std::string news;  ///< to be said; empty: nothing
+    std::vector<Error> errors;
+    std::optional<view::Pose> fly_to{};
+  };
+  /// Has a worker do what reads or writes files.
+  void have_done(std::function<Done()> work);
+  void take_done(double now);
 
   /// Whether there is something new to show.
   bool picture_changes(double now);
@@ -78,6 +94,7 @@ class Viewer {
   int frames_owed_ = 3;            ///< panels need some frames to settle
   std::int64_t shown_bytes_ = -1;  ///< uploaded when the last frame was drawn
   bool shown_complete_ = false;
+  std::shared_ptr<BoundedQueue<Done>> done_ = std::make_shared<BoundedQueue<Done>>(64);
   std::string notice_;
   double notice_until_ = 0;
   int last_screenshot_ = 0;

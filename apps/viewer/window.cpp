@@ -78,6 +78,8 @@ glm::dvec2 Window::scale() const {
   return glm::dvec2(size_px()) / glm::dvec2(glm::max(units, glm::ivec2(1)));
 }
 
+void Window::wake() { glfwPostEmptyEvent(); }
+
 void Window::show_frame() { glfwSwapBuffers(handle()); }
 
 }  // namespace tellurion::apps

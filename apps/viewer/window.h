@@ -28,6 +28,8 @@ class Window {
   /// Pixels of the picture for one unit of the desktop's cursor positions.
   glm::dvec2 scale() const;
   void show_frame();
+  /// Has the thread that waits for events go on. On any thread.
+  static void wake();
 
  private:
   struct Closer {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
 #include <limits>
 #include <mutex>
 #include <numbers>
@@ -30,6 +31,7 @@
 #include "source/tiles/service_source.h"
 #include "source/tiles/tile_archive.h"
 #include "source/tiles/tiled_source.h"
+#include "surface/error_scan.h"
 #include "surface/surface_facts_made.h"
 
 namespace tellurion::globe {
@@ -141,32 +143,48 @@ std::filesystem::path default_cache_folder() {
   return {};
 }
 
+namespace {
+
+/// A layer while its world is open.
+struct OpenLayer {
+  LayerInfo info;  ///< never changes
+  // Guarded by the globe's mutex:
+  SourceStats stats{};
+  std::string error{};                           ///< why it could not be opened
+  std::shared_ptr<LayerCatalogue> catalogue{};   ///< null: of another type, not opened yet, or removed
+  bool opened = false;                           ///< or tried, or a worker does
+  bool removed = false;
+};
+
+}  // namespace
+
 struct Globe::State {
   State(World w, const GlobeOptions& o)
       : world(std::move(w)),
         options(o),
         // GDAL's own block cache takes a quarter of the budget.
-        blocks(o.memory_cache_bytes - o.memory_cache_bytes / 4) {}
+        blocks(o.memory_cache_bytes - o.memory_cache_bytes / 4) {
+    kept.file = world.file;
+    for (std::size_t i = 0; !kept.file.empty() && i < world.layers.size(); ++i) kept.layers.insert(i);
+  }
 
   World world;
   GlobeOptions options;
   cache::BlockCache blocks;
   std::shared_ptr<fetch::ByteStore> store;  ///< null: no layer needs it
-  std::vector<LayerInfo> layers;
   std::unique_ptr<SurfaceSteps> steps;
   std::atomic<std::uint32_t> next_data_set{1u << 31};       ///< number of the next data set of a catalogue: layers have small ones
-  std::vector<std::unique_ptr<LayerCatalogue>> catalogues;  ///< of each layer; null for those of other types
   std::mutex store_mutex;                                   ///< guards `store` while it is made
+  std::mutex keeping;                                       ///< held while `kept` is changed, as long as that takes
 
   mutable std::mutex mutex;  ///< guards what follows
   std::shared_ptr<const surface::SurfaceDescription> surface;
   std::shared_ptr<const surface::ErrorTable> table;
   std::shared_ptr<const surface::SurfaceFacts> facts;
   std::vector<std::pair<std::shared_ptr<const surface::SurfaceDescription>, std::shared_ptr<const surface::SurfaceFacts>>> other_facts;  ///< of other times
-  std::vector<SourceStats> sources;
-  std::vector<bool> opened;            ///< of each layer: has been opened, or tried
-  int opening = 0;                     ///< layers that workers open
-  std::uint64_t tables_revision = 0;   ///< of the surface that the tables are of
+  std::deque<OpenLayer> layers;        ///< stay where they are
+  KeptLayers kept;
+  int opening = 0;                     ///< jobs in which workers open layers
   std::shared_ptr<HeightTables> tables;
 
   std::vector<std::unique_ptr<SurfaceWorker>> workers;
@@ -174,13 +192,23 @@ struct Globe::State {
 
   std::shared_ptr<fetch::ByteStore> needed_store();
   Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
+  Result<std::shared_ptr<const source::RasterSource>> open_raster(const LayerSpec& spec);
   Result<std::unique_ptr<LayerCatalogue>> open_catalogue(const LayerSpec& spec, std::size_t layer);
-  void show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
   void open_layers();
+  void submit_opening(std::function<void()> work);
   void open_later(std::size_t layer);
-  void show_changed(bool heights);
-  std::shared_ptr<HeightTables> begin_heights();
+  Result<void> open_layer(std::size_t layer);
+  std::size_t append(const LayerSpec& spec, bool opened);
+  Result<void> remove(std::size_t layer);
+  Result<std::size_t> add_data(const std::string& data);
+  std::string free_name(const std::string& name);
+  void show_changed();
+  void show(std::shared_ptr<const surface::SurfaceDescription> changed);
+  std::shared_ptr<HeightTables> make_tables();
   std::shared_ptr<HeightTables> current_tables();
+  OpenLayer& layer_at(std::size_t layer);
+  std::shared_ptr<LayerCatalogue> catalogue_at(std::size_t layer);
+  Result<std::shared_ptr<LayerCatalogue>> catalogue_to_change(std::size_t layer);
 };
 
 /// The store of bytes, made for the first layer that needs it.
@@ -221,6 +249,14 @@ Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const La
   return source::open_gdal(how, world.ellipsoid);
 }
 
+/// What a layer without times shows.
+Result<std::shared_ptr<const source::RasterSource>> Globe::State::open_raster(const LayerSpec& spec) {
+  if (spec.source.raster) return spec.source.raster;
+  auto source = open_source(spec);
+  if (!source) return source.error();
+  return std::shared_ptr<const source::RasterSource>(std::move(*source));
+}
+
 Result<std::unique_ptr<LayerCatalogue>> Globe::State::open_catalogue(const LayerSpec& spec, std::size_t layer) {
   LayerCatalogue::Setting setting;
   setting.layer = spec;
@@ -229,48 +265,58 @@ Result<std::unique_ptr<LayerCatalogue>> Globe::State::open_catalogue(const Layer
   setting.open = [this](const LayerSpec& one) { return open_source(one); };
   setting.next_id = [this] { return next_data_set++; };
   setting.look_into_more = [this, layer] {
-    pool->submit_background([this, layer](int) { catalogues[layer]->examine_some(); });
+    pool->submit_background([this, layer](int) {
+      if (const auto catalogue = catalogue_at(layer)) catalogue->examine_some();
+    });
   };
-  setting.publish = [this, layer](std::shared_ptr<const source::Catalogue> catalogue) { show_catalogue(layer, std::move(catalogue)); };
+  setting.publish = [this, layer](std::shared_ptr<const source::Catalogue> catalogue) {
+    steps->set_catalogue(layer, std::move(catalogue));
+    show_changed();
+  };
   return LayerCatalogue::open(std::move(setting));
 }
 
-void Globe::State::show_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
-  steps->set_catalogue(layer, std::move(catalogue));
-  show_changed(false);
+/// What the layers are now is shown; where files have to be opened for that, by a worker.
+void Globe::State::show_changed() {
+  if (auto held = steps->held_at(options.time)) return show(std::move(held));
+  submit_opening([this] { show(steps->at(options.time)); });
 }
 
-/// What the layers are now is shown. `heights`: others have error tables.
-void Globe::State::show_changed(bool heights) {
-  auto changed = steps->at(options.time);
-  {
-    std::lock_guard lock(mutex);
-    if (changed == surface) return;
-    surface = std::move(changed);
-    if (heights) table = nullptr;
-    facts = surface::make_facts(surface, table);
-    other_facts.clear();
-  }
-  if (heights) begin_heights()->begin_scan();
-}
-
-/// Error tables for the heights as they are now.
-std::shared_ptr<HeightTables> Globe::State::begin_heights() {
+/// Nothing if something newer is shown.
+void Globe::State::show(std::shared_ptr<const surface::SurfaceDescription> changed) {
   std::shared_ptr<HeightTables> begun;
   {
     std::lock_guard lock(mutex);
-    const std::uint64_t revision = surface->revision;
-    begun = tables = std::make_shared<HeightTables>(surface, blocks, options.cache_folder, *pool, [this, revision](std::shared_ptr<const surface::ErrorTable> found) {
-      std::lock_guard guard(mutex);
-      if (revision != tables_revision) return;  // heights have changed since
-      table = std::move(found);
-      facts = surface::make_facts(surface, table);
-      other_facts.clear();
-    });
-    tables_revision = revision;
+    if (changed->revision <= surface->revision) return;
+    surface = std::move(changed);
+    if (surface::table_revision(*surface) != tables->revision()) {
+      table = nullptr;
+      begun = tables = make_tables();
+    }
+    facts = surface::make_facts(surface, table);
+    other_facts.clear();
   }
-  begun->load(options.scan_heights);
-  return begun;
+  if (!begun) return;
+  const WorkerPool::Job load = [begun = std::weak_ptr(begun), scan = options.scan_heights](int) {
+    const auto still_wanted = begun.lock();
+    if (!still_wanted) return;  // heights have changed again
+    still_wanted->load(scan);
+    still_wanted->begin_scan();
+  };
+  // Soon: until it is there, finer tiles are built than are needed.
+  if (!pool->try_submit(load)) pool->submit_background(load);
+}
+
+/// Error tables for the heights as they are now. With the lock held.
+std::shared_ptr<HeightTables> Globe::State::make_tables() {
+  return std::make_shared<HeightTables>(surface, blocks, options.cache_folder, *pool,
+                                        [this, revision = surface::table_revision(*surface)](std::shared_ptr<const surface::ErrorTable> found) {
+    std::lock_guard lock(mutex);
+    if (revision != tables->revision()) return;  // heights have changed since
+    table = std::move(found);
+    facts = surface::make_facts(surface, table);
+    other_facts.clear();
+  });
 }
 
 std::shared_ptr<HeightTables> Globe::State::current_tables() {
@@ -278,66 +324,145 @@ std::shared_ptr<HeightTables> Globe::State::current_tables() {
   return tables;
 }
 
-/// Has a worker open a layer that was off.
-void Globe::State::open_later(std::size_t layer) {
+OpenLayer& Globe::State::layer_at(std::size_t layer) {
+  std::lock_guard lock(mutex);
+  return layers[layer];
+}
+
+std::shared_ptr<LayerCatalogue> Globe::State::catalogue_at(std::size_t layer) {
+  std::lock_guard lock(mutex);
+  return layers[layer].catalogue;
+}
+
+/// Has a worker open something; catalogues_ready() waits for it.
+void Globe::State::submit_opening(std::function<void()> work) {
   {
     std::lock_guard lock(mutex);
-    if (opened[layer]) return;
-    opened[layer] = true;
     ++opening;
   }
-  pool->submit_background([this, layer](int) {
-    const LayerSpec& spec = world.layers[layer];
-    auto source = spec.source.raster ? Result<std::unique_ptr<source::RasterSource>>(nullptr) : open_source(spec);
-    if (source) {
-      steps->set_source(layer, spec.source.raster ? spec.source.raster : std::shared_ptr<const source::RasterSource>(std::move(*source)));
-      show_changed(spec.group == LayerGroup::height);
-    }
+  pool->submit_background([this, work = std::move(work)](int) {
+    work();
     std::lock_guard lock(mutex);
-    if (!source) {
-      ++sources[layer].errors;
-      sources[layer].last_error = source.error().message;
-    }
     --opening;
   });
 }
 
+/// Has a worker open a layer that was off or is new.
+void Globe::State::open_later(std::size_t layer) {
+  {
+    std::lock_guard lock(mutex);
+    if (std::exchange(layers[layer].opened, true)) return;
+  }
+  submit_opening([this, layer] {
+    const Result<void> opened = open_layer(layer);
+    if (opened) return;
+    std::lock_guard lock(mutex);
+    OpenLayer& one = layers[layer];
+    one.stats.errors = 1;
+    one.stats.last_error = one.error = opened.error().message;
+  });
+}
+
+/// Opens and shows it, unless it has been removed.
+Result<void> Globe::State::open_layer(std::size_t layer) {
+  const LayerSpec& spec = layer_at(layer).info.spec;
+  if (spec.source.type == "catalogue") {
+    auto opened = open_catalogue(spec, layer);
+    if (!opened) return opened.error();
+    const std::shared_ptr<LayerCatalogue> catalogue = std::move(*opened);
+    {
+      std::lock_guard lock(mutex);
+      if (layers[layer].removed) return {};
+      layers[layer].catalogue = catalogue;
+    }
+    catalogue->begin();
+    return {};
+  }
+  if (!spec.source.time) {
+    auto raster = open_raster(spec);
+    if (!raster) return raster.error();
+    steps->set_source(layer, std::move(*raster));
+  }
+  show_changed();
+  return {};
+}
+
 void Globe::State::open_layers() {
+  std::vector<LayerInfo> infos;
   for (const LayerSpec& spec : world.layers) {
-    LayerInfo info;
-    info.spec = spec;
-    SourceStats stats;
-    stats.name = spec.name;
+    OpenLayer layer{.info = {.spec = spec, .raster = nullptr, .error = {}}, .opened = spec.enabled || spec.source.type == "catalogue" || spec.source.time};
+    LayerInfo& info = layer.info;
+    layer.stats.name = spec.name;
     const auto fail = [&](const Error& error) {
       const std::string place = spec.line > 0 ? fmt::format("{}:{}: ", world.file.string(), spec.line) : "";
-      stats.errors = 1;
-      stats.last_error = info.error = place + error.message;
+      layer.stats.errors = 1;
+      layer.stats.last_error = layer.error = info.error = place + error.message;
     };
-    catalogues.emplace_back();
-    opened.push_back(spec.enabled || spec.source.type == "catalogue" || spec.source.time);
-    if (spec.enabled && spec.source.raster) {
-      info.raster = spec.source.raster;
-    } else if (spec.source.type == "catalogue") {
+    if (spec.source.type == "catalogue") {
       if (auto catalogue = open_catalogue(spec, layers.size())) {
-        catalogues.back() = std::move(*catalogue);
-        info.catalogue = catalogues.back()->current();
+        layer.catalogue = std::move(*catalogue);
+        info.catalogue = layer.catalogue->current();
       } else if (spec.enabled) {
         fail(catalogue.error());
       }
     } else if (spec.enabled && !spec.source.time) {
-      auto source = open_source(spec);
-      if (source) {
-        info.raster = std::move(*source);
-      } else {
-        fail(source.error());
-      }
+      if (auto raster = open_raster(spec)) info.raster = std::move(*raster);
+      else fail(raster.error());
     }
-    layers.push_back(std::move(info));
-    sources.push_back(std::move(stats));
+    infos.push_back(info);
+    layers.push_back(std::move(layer));
   }
-  steps = std::make_unique<SurfaceSteps>(world.ellipsoid, layers, [this](const LayerSpec& spec) { return open_source(spec); });
+  steps = std::make_unique<SurfaceSteps>(world.ellipsoid, infos, [this](const LayerSpec& spec) { return open_source(spec); });
   surface = steps->at(options.time);
-  for (std::size_t i = 0; i < layers.size(); ++i) layers[i].raster = steps->raster_at(i, options.time);
+  for (std::size_t i = 0; i < layers.size(); ++i) layers[i].info.raster = steps->raster_at(i, options.time);
+}
+
+// --- Layers that come and go -----------------------------------------------------------------------------------------
+
+std::size_t Globe::State::append(const LayerSpec& spec, bool opened) {
+  std::lock_guard lock(mutex);
+  OpenLayer layer{.info = {.spec = spec, .raster = nullptr, .error = {}}, .opened = opened};
+  layer.info.spec.line = 0;
+  layer.stats.name = spec.name;
+  layers.push_back(std::move(layer));
+  return steps->add(spec);
+}
+
+Result<void> Globe::State::remove(std::size_t layer) {
+  std::shared_ptr<LayerCatalogue> catalogue;  // goes when the lock has gone
+  {
+    std::lock_guard lock(mutex);
+    if (layer >= layers.size() || layers[layer].removed) return {ErrorCode::invalid_argument, fmt::format("there is no layer {} to remove", layer)};
+    layers[layer].removed = true;
+    catalogue = std::move(layers[layer].catalogue);
+  }
+  steps->remove(layer);
+  show_changed();
+  return {};
+}
+
+/// Worker side.
+Result<std::size_t> Globe::State::add_data(const std::string& data) {
+  const auto world_of = world_of_data(data);
+  if (!world_of) return world_of.error();
+  auto spec = layer_for(world, *world_of);
+  if (!spec) return spec.error();
+  spec->name = free_name(spec->name);
+  const std::size_t layer = append(*spec, true);
+  if (const Result<void> opened = open_layer(layer); !opened) {
+    (void)remove(layer);
+    return opened.error();
+  }
+  return layer;
+}
+
+/// `name`, with a number behind it if a layer has it.
+std::string Globe::State::free_name(const std::string& name) {
+  std::lock_guard lock(mutex);
+  std::string free = name;
+  const auto is_taken = [&] { return std::ranges::any_of(layers, [&](const OpenLayer& layer) { return !layer.removed && layer.info.spec.name == free; }); };
+  for (int n = 2; is_taken(); ++n) free = fmt::format("{} {}", name, n);
+  return free;
 }
 
 Globe::Globe(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -352,25 +477,43 @@ Result<std::unique_ptr<Globe>> Globe::open(World world, const GlobeOptions& opti
   State& s = *globe->state_;
   for (int i = 0; i < std::max(threads, 1); ++i) s.workers.push_back(std::make_unique<SurfaceWorker>(s.blocks));
   s.pool = std::make_unique<WorkerPool>(threads, kWaitingJobs);
-  s.begin_heights();
-  for (std::size_t i = 0; i < s.catalogues.size(); ++i) {
-    if (s.catalogues[i] && s.world.layers[i].enabled) s.catalogues[i]->begin();
+  s.tables = s.make_tables();
+  s.facts = surface::make_facts(s.surface, nullptr);
+  s.tables->load(options.scan_heights);
+  for (std::size_t i = 0; i < s.layers.size(); ++i) {
+    if (s.layers[i].catalogue && s.world.layers[i].enabled) s.layers[i].catalogue->begin();
   }
   return globe;
 }
 
 const World& Globe::world() const { return state_->world; }
 const geo::Ellipsoid& Globe::ellipsoid() const { return state_->world.ellipsoid; }
-const std::vector<LayerInfo>& Globe::layers() const { return state_->layers; }
+const LayerInfo& Globe::layer(std::size_t layer) const { return state_->layer_at(layer).info; }
+
+std::size_t Globe::layer_count() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->layers.size();
+}
+
 std::shared_ptr<const source::RasterSource> Globe::raster_at(std::size_t layer, const std::optional<UtcTime>& time) const { return state_->steps->raster_at(layer, time); }
 std::string Globe::step_of(std::size_t layer, const std::optional<UtcTime>& time) const { return state_->steps->text_of(layer, time); }
 
+std::shared_ptr<const source::RasterSource> Globe::shown_raster(std::size_t layer) const {
+  const LayerInfo& info = this->layer(layer);
+  return info.spec.source.time ? info.raster : state_->steps->raster_at(layer, {});
+}
+
 std::vector<std::string> Globe::hints() const {
   std::vector<std::string> hints;
-  for (const LayerInfo& layer : state_->layers) {
-    if (!layer.error.empty()) hints.push_back(layer.error);
-    if (!layer.raster) continue;
-    const auto& more = layer.raster->description().hints;
+  for (std::size_t i = 0; i < layer_count(); ++i) {
+    {
+      std::lock_guard lock(state_->mutex);
+      if (state_->layers[i].removed) continue;
+      if (!state_->layers[i].error.empty()) hints.push_back(state_->layers[i].error);
+    }
+    const auto raster = shown_raster(i);
+    if (!raster) continue;
+    const auto& more = raster->description().hints;
     hints.insert(hints.end(), more.begin(), more.end());
   }
   return hints;
@@ -378,7 +521,8 @@ std::vector<std::string> Globe::hints() const {
 
 std::vector<std::string> Globe::problems() const {
   std::vector<std::string> sentences;
-  for (const auto& catalogue : state_->catalogues) {
+  for (std::size_t i = 0; i < layer_count(); ++i) {
+    const auto catalogue = state_->catalogue_at(i);
     if (!catalogue) continue;
     const LayerCatalogue::Problems found = catalogue->problems();
     sentences.insert(sentences.end(), found.sentences.begin(), found.sentences.end());
@@ -392,7 +536,7 @@ std::vector<SourceStats> Globe::source_stats() const {
   std::vector<SourceStats> all;
   {
     std::lock_guard lock(state_->mutex);
-    all = state_->sources;
+    for (const OpenLayer& layer : state_->layers) all.push_back(layer.stats);
   }
   for (std::size_t layer = 0; layer < all.size(); ++layer) {
     for (const std::uint32_t id : state_->steps->source_ids(layer)) {
@@ -405,7 +549,7 @@ std::vector<SourceStats> Globe::source_stats() const {
     const SurfaceSteps::Failures failures = state_->steps->failures_of(layer);
     all[layer].errors += failures.count;
     if (failures.count > 0) all[layer].last_error = failures.last_error;
-    if (const auto& catalogue = state_->catalogues[layer]) {
+    if (const auto catalogue = state_->catalogue_at(layer)) {
       const LayerCatalogue::Problems problems = catalogue->problems();
       const source::OpenDataSets::Failures unopened = catalogue->current()->open_sets()->failures();
       all[layer].errors += problems.count + unopened.count;
@@ -419,12 +563,12 @@ std::vector<SourceStats> Globe::source_stats() const {
 bool Globe::data_missing() const {
   const auto cannot_be_opened = [&](std::size_t layer) {
     std::lock_guard lock(state_->mutex);
-    return state_->sources[layer].errors > 0;
+    return state_->layers[layer].stats.errors > 0;
   };
-  for (std::size_t layer = 0; layer < state_->layers.size(); ++layer) {
+  for (std::size_t layer = 0; layer < layer_count(); ++layer) {
     if (!layer_settings(layer).enabled) continue;
     if (cannot_be_opened(layer) || state_->steps->failures_of(layer).count > 0) return true;
-    const auto& catalogue = state_->catalogues[layer];
+    const auto catalogue = state_->catalogue_at(layer);
     if (catalogue && (catalogue->problems().count > 0 || catalogue->current()->open_sets()->failures().count > 0)) return true;
     for (const std::uint32_t id : state_->steps->source_ids(layer)) {
       if (state_->blocks.reads_of(id).lost > 0) return true;
@@ -483,14 +627,17 @@ std::optional<Region> region_of(const source::Catalogue& catalogue, double a) {
 
 }  // namespace
 
-view::Pose Globe::home() const {
+view::Pose Globe::home() const { return home_of(layer_order()); }
+view::Pose Globe::home(std::size_t layer) const { return home_of({layer}); }
+
+view::Pose Globe::home_of(const std::vector<std::size_t>& layers) const {
   const double a = ellipsoid().a();
   view::Pose pose;
   std::optional<Region> finest;
-  for (std::size_t i = 0; i < state_->layers.size(); ++i) {
+  for (const std::size_t i : layers) {
     const auto catalogue = catalogue_of(i);
-    const LayerInfo& layer = state_->layers[i];
-    const auto region = layer.raster ? region_of(layer.raster->description(), a) : catalogue ? region_of(*catalogue, a) : std::nullopt;
+    const auto raster = shown_raster(i);
+    const auto region = raster ? region_of(raster->description(), a) : catalogue ? region_of(*catalogue, a) : std::nullopt;
     if (region && (!finest || region->spacing < finest->spacing)) finest = region;
   }
   if (!finest) {
@@ -506,26 +653,36 @@ view::Pose Globe::home() const {
   return pose;
 }
 
+Result<std::shared_ptr<LayerCatalogue>> Globe::State::catalogue_to_change(std::size_t layer) {
+  std::lock_guard lock(mutex);
+  if (layer < layers.size() && layers[layer].catalogue) return layers[layer].catalogue;
+  const bool may_come = layer < layers.size() && !layers[layer].removed && layers[layer].error.empty() && layers[layer].info.spec.source.type == "catalogue";
+  if (may_come) return Error{ErrorCode::unavailable, fmt::format("layer {} is not open yet: rasters cannot be put into it or taken out", layer)};
+  return Error{ErrorCode::invalid_argument, fmt::format("layer {} is no catalogue: rasters cannot be put into it or taken out", layer)};
+}
+
 Result<void> Globe::insert(std::size_t layer, const std::vector<std::string>& rasters) {
-  if (layer >= state_->catalogues.size() || !state_->catalogues[layer])
-    return Error{ErrorCode::invalid_argument, fmt::format("layer {} is no catalogue: rasters cannot be put into it", layer)};
-  state_->catalogues[layer]->insert(rasters);
+  const auto catalogue = state_->catalogue_to_change(layer);
+  if (!catalogue) return catalogue.error();
+  (*catalogue)->insert(rasters);
   return {};
 }
 
 Result<void> Globe::remove(std::size_t layer, const std::vector<std::string>& rasters) {
-  if (layer >= state_->catalogues.size() || !state_->catalogues[layer])
-    return Error{ErrorCode::invalid_argument, fmt::format("layer {} is no catalogue: no rasters can be taken out of it", layer)};
-  state_->catalogues[layer]->remove(rasters);
+  const auto catalogue = state_->catalogue_to_change(layer);
+  if (!catalogue) return catalogue.error();
+  (*catalogue)->remove(rasters);
   return {};
 }
 
 std::shared_ptr<const source::Catalogue> Globe::catalogue_of(std::size_t layer) const {
-  return state_->catalogues[layer] ? state_->catalogues[layer]->current() : nullptr;
+  const auto catalogue = state_->catalogue_at(layer);
+  return catalogue ? catalogue->current() : nullptr;
 }
 
 std::size_t Globe::rasters_to_look_into(std::size_t layer) const {
-  return state_->catalogues[layer] ? state_->catalogues[layer]->unexamined() : 0;
+  const auto catalogue = state_->catalogue_at(layer);
+  return catalogue ? catalogue->unexamined() : 0;
 }
 
 bool Globe::catalogues_ready() const {
@@ -533,8 +690,8 @@ bool Globe::catalogues_ready() const {
     std::lock_guard lock(state_->mutex);
     if (state_->opening > 0) return false;
   }
-  for (std::size_t i = 0; i < state_->catalogues.size(); ++i) {
-    const auto& catalogue = state_->catalogues[i];
+  for (std::size_t i = 0; i < layer_count(); ++i) {
+    const auto catalogue = state_->catalogue_at(i);
     if (catalogue && catalogue->unexamined() > 0 && layer_settings(i).enabled) return false;
   }
   return true;
@@ -545,25 +702,59 @@ std::vector<std::size_t> Globe::layer_order() const { return state_->steps->orde
 
 Result<void> Globe::set_layer(std::size_t layer, const LayerSettings& settings) {
   State& s = *state_;
-  if (layer >= s.layers.size()) return {ErrorCode::invalid_argument, fmt::format("there is no layer {}: the world has {}", layer, s.layers.size())};
-  const LayerSpec& spec = s.world.layers[layer];
+  {
+    std::lock_guard lock(s.mutex);
+    if (layer >= s.layers.size()) return {ErrorCode::invalid_argument, fmt::format("there is no layer {}: the world has {}", layer, s.layers.size())};
+    if (s.layers[layer].removed) return {ErrorCode::invalid_argument, fmt::format("layer {} has been removed", layer)};
+  }
+  const LayerSpec& spec = s.layer_at(layer).info.spec;
   if (Result<void> fine = check(settings, spec.group); !fine) return {ErrorCode::invalid_argument, fmt::format("layer \"{}\": {}", spec.name, fine.error().message)};
   const LayerSettings before = s.steps->settings(layer);
   if (settings == before) return {};
   s.steps->set_settings(layer, settings);
-  const bool heights = spec.group == LayerGroup::height && (settings.enabled || before.enabled);
   if (settings.enabled && !before.enabled) {
     s.open_later(layer);
-    if (s.catalogues[layer]) s.catalogues[layer]->begin();
+    if (const auto catalogue = s.catalogue_at(layer)) catalogue->begin();
   }
-  s.show_changed(heights);
+  s.show_changed();
   return {};
 }
 
 bool Globe::move_layer(std::size_t layer, bool up) {
-  if (layer >= state_->layers.size() || !state_->steps->move(layer, up)) return false;
-  state_->show_changed(state_->world.layers[layer].group == LayerGroup::height);
+  if (layer >= layer_count() || !state_->steps->move(layer, up)) return false;
+  state_->show_changed();
   return true;
+}
+
+Result<std::size_t> Globe::add_layer(const LayerSpec& spec) {
+  if (Result<void> fine = check(spec, spec.group); !fine) return Error{ErrorCode::invalid_argument, fmt::format("layer \"{}\": {}", spec.name, fine.error().message)};
+  const std::size_t layer = state_->append(spec, false);
+  if (spec.enabled) state_->open_later(layer);
+  return layer;
+}
+
+Result<void> Globe::remove_layer(std::size_t layer) { return state_->remove(layer); }
+
+void Globe::add_data(std::vector<std::string> data, std::function<void(const std::vector<AddedData>&)> done) {
+  state_->submit_opening([s = state_.get(), data = std::move(data), done = std::move(done)] {
+    std::vector<AddedData> added;
+    for (const std::string& one : data) added.push_back({one, s->add_data(one)});
+    done(added);
+  });
+}
+
+KeptLayers Globe::kept_layers() const {
+  std::lock_guard lock(state_->mutex);
+  return state_->kept;
+}
+
+Result<void> Globe::change_kept_layers(const std::function<Result<void>(KeptLayers&)>& change) {
+  std::lock_guard one_at_a_time(state_->keeping);
+  KeptLayers kept = kept_layers();
+  if (Result<void> changed = change(kept); !changed) return changed;
+  std::lock_guard lock(state_->mutex);
+  state_->kept = std::move(kept);
+  return {};
 }
 
 bool Globe::tables_ready() const { return state_->current_tables()->ready(); }

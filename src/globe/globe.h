@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,12 +71,24 @@ class HeightSampler {
   std::unique_ptr<State> state_;
 };
 
-/// A layer of an open world.
+/// A layer of an open world, as it was when the world was opened; of one that came later only the spec.
 struct LayerInfo {
   LayerSpec spec;
   std::shared_ptr<const source::RasterSource> raster;   ///< null: disabled, of a group that is not drawn, or not opened
   std::string error;                                    ///< why it was not opened
-  std::shared_ptr<const source::Catalogue> catalogue{}; ///< of type "catalogue", as it was when the world was opened
+  std::shared_ptr<const source::Catalogue> catalogue{}; ///< of type "catalogue"
+};
+
+/// What became of data that were put on a globe.
+struct AddedData {
+  std::string data;           ///< as they were named
+  Result<std::size_t> layer;  ///< its number, or why there is none
+};
+
+/// Which layers stand in which world file.
+struct KeptLayers {
+  std::filesystem::path file;    ///< empty: in none
+  std::set<std::size_t> layers;  ///< also such as have been removed since
 };
 
 /// A world that is open. Its functions are thread-safe unless they say otherwise.
@@ -86,14 +99,24 @@ class Globe {
   static Result<std::unique_ptr<Globe>> open(World world, const GlobeOptions& options);
   ~Globe();
 
-  const World& world() const;
+  const World& world() const;  ///< as it was opened
   const geo::Ellipsoid& ellipsoid() const;
 
-  /// A good first look: all of the layers' data if they are regional, else the whole body.
+  /// A good first look: the finest layer's data if they are regional, else the whole body. Reads heights.
   view::Pose home() const;
+  /// The same of one layer's data.
+  view::Pose home(std::size_t layer) const;
 
-  const std::vector<LayerInfo>& layers() const;
-  /// A layer's raster at `time`; null as LayerInfo's.
+  // Layers are known by number, from 0 as in the world's list. Those that are added get the numbers after that; one that has been removed
+  // leaves its number unused, switched off and out of layer_order().
+
+  /// With those that have been removed.
+  std::size_t layer_count() const;
+  /// Stays where it is, as it is, as long as the globe.
+  const LayerInfo& layer(std::size_t layer) const;
+  /// What a layer shows now; of one with times what it showed at first. Null: nothing, or a catalogue. Opens nothing.
+  std::shared_ptr<const source::RasterSource> shown_raster(std::size_t layer) const;
+  /// A layer's raster at `time`, which may be opened for that; null as LayerInfo's.
   std::shared_ptr<const source::RasterSource> raster_at(std::size_t layer, const std::optional<UtcTime>& time) const;
   /// What of a layer with times is shown at `time`, as its path or URL has it; empty for others.
   std::string step_of(std::size_t layer, const std::optional<UtcTime>& time) const;
@@ -120,16 +143,31 @@ class Globe {
   /// All layers, the lowest first.
   std::vector<std::size_t> layer_order() const;
 
+  /// Puts a layer over the others of its group, for as long as the globe is open, and gives its number. Returns at once: a worker opens it;
+  /// until then it shows nothing; if it fails, source_stats and hints tell why. Only the tiles that it touches are made anew.
+  /// Paths are absolute. Errors: invalid_argument (settings out of their range).
+  Result<std::size_t> add_layer(const LayerSpec& spec);
+  /// Takes one away. Errors: invalid_argument (there is none of this number any more).
+  Result<void> remove_layer(std::size_t layer);
+  /// Puts data on top as `tellurion world add` would: each a layer of what it looks like, a folder a catalogue. Returns at once; a worker
+  /// opens them one after the other, and calls `done` with what became of each. What cannot be opened becomes no layer.
+  void add_data(std::vector<std::string> data, std::function<void(const std::vector<AddedData>&)> done);
+
+  /// Where the layers are kept: at first in the file that the world was read from, all of them.
+  KeptLayers kept_layers() const;
+  /// Calls `change` with that, not two at a time, and takes over what it makes of it if it succeeds. For save_layers.
+  Result<void> change_kept_layers(const std::function<Result<void>(KeptLayers&)>& change);
+
   /// Puts rasters (paths or URLs) into a layer of type "catalogue", in the place of those of the same path; or takes some out. Both return at
   /// once; files are looked into by workers, and only the tiles that they touch are made anew. Kept while the globe is open.
-  /// Errors: invalid_argument (no such layer, or none of that type).
+  /// Errors: invalid_argument (no such layer, or none of that type); unavailable (a worker has still to open it).
   Result<void> insert(std::size_t layer, const std::vector<std::string>& rasters);
   Result<void> remove(std::size_t layer, const std::vector<std::string>& rasters);
   /// A catalogue's rasters as they are known now; null for other layers.
   std::shared_ptr<const source::Catalogue> catalogue_of(std::size_t layer) const;
   /// How many rasters of it have not been looked into.
   std::size_t rasters_to_look_into(std::size_t layer) const;
-  /// Whether all rasters of catalogues have been looked into, and layers that were switched on are open.
+  /// Whether all rasters of catalogues have been looked into, and layers that were switched on or added are open.
   bool catalogues_ready() const;
   /// Waits for that (without threads: looks into them here). False if `deadline` came first.
   bool wait_for_catalogues(std::chrono::steady_clock::time_point deadline);
@@ -163,6 +201,7 @@ class Globe {
  private:
   struct State;
   explicit Globe(std::unique_ptr<State> state);
+  view::Pose home_of(const std::vector<std::size_t>& layers) const;
   std::unique_ptr<State> state_;
 };
 

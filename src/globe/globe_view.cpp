@@ -148,9 +148,9 @@ bool GlobeView::State::submit(const geo::TileKey& key, Part part) {
   });
 }
 
-/// The roots are never asked for again, but must not depend on when the tables came.
+/// The roots are never asked for again, but must not depend on when the tables came. No more of them are in flight than `finished` has room for.
 void GlobeView::State::renew_roots() {
-  while (roots_to_renew > 0 && submit({static_cast<std::uint8_t>(roots_to_renew - 1), 0, 0, 0}, Part::geometry)) {
+  while (roots_to_renew > 0 && roots_renewing < geo::kFaceCount && submit({static_cast<std::uint8_t>(roots_to_renew - 1), 0, 0, 0}, Part::geometry)) {
     --roots_to_renew;
     ++roots_renewing;
     ++in_flight;
@@ -170,6 +170,7 @@ void GlobeView::State::show_surface_at(const ViewSettings& settings) {
   slots.layers_changed(*surface, *latest);
   tree.forget_failures(Part::colour);
   surface = std::move(latest);
+  if (std::ranges::find(surface->colours, surface::ImageUse::overlay, &surface::Layer::use) != surface->colours.end()) renderer->allow_overlays(thread);
   std::erase_if(waiting, [&](const WaitingPart& part) {
     if (part.part != Part::colour) return false;
     tree.cancelled(part.key, part.part);
@@ -392,7 +393,9 @@ void GlobeView::State::update(const view::Camera& camera, const ViewSettings& se
   stats.tiles_drawn_by_level = s.drawn_by_level;
   stats.tiles_waiting = s.tiles_waiting;
   stats.max_error_px = s.max_error_px;
-  stats.complete = s.complete && globe.tables_ready() && globe.catalogues_ready() && heights == globe.surface() && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !is_stale() && !(transitions && steps.is_behind());
+  // The globe is asked first whether it is ready, then whether this is what it has: it may have changed since it was looked at above.
+  const bool is_latest = globe.tables_ready() && globe.catalogues_ready() && first_facts == globe.facts() && heights == globe.surface();
+  stats.complete = s.complete && is_latest && roots_to_renew == 0 && roots_renewing == 0 && roots_to_retry.empty() && !is_stale() && !(transitions && steps.is_behind());
   stats.bytes_uploaded = static_cast<std::int64_t>(renderer->bytes_uploaded());
   stats.memory_cache_bytes = static_cast<std::int64_t>(globe.memory_cache_bytes());
   stats.gpu_cache_bytes = static_cast<std::int64_t>(renderer->gpu_bytes());
@@ -493,7 +496,7 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   render::RendererOptions options;
   options.ellipsoid = globe.ellipsoid();
   options.gpu_budget_bytes = gpu_budget_bytes;
-  options.overlays = std::ranges::any_of(globe.layers(), [](const LayerInfo& layer) { return layer.spec.group == LayerGroup::overlay; });
+  for (std::size_t i = 0; i < globe.layer_count(); ++i) options.overlays = options.overlays || globe.layer(i).spec.group == LayerGroup::overlay;
   auto renderer = render::Renderer::create(thread, options);
   if (!renderer) return renderer.error();
   state->renderer = std::move(*renderer);

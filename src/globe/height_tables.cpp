@@ -23,6 +23,7 @@ struct HeightTables::State {
   std::filesystem::path file;  ///< empty: not kept
   std::string revision;
   std::stop_source stop;
+  std::atomic<bool> loaded{false};  ///< or there was none to load
   std::atomic<bool> ready{false};
   std::atomic<bool> begun{false};
 
@@ -108,16 +109,15 @@ void HeightTables::load(bool scan) {
     if (auto kept = surface::ErrorTable::load(s.file, s.revision)) {
       s.publish(std::make_shared<const surface::ErrorTable>(std::move(*kept)));
       s.ready = true;
-      return;
     }
   }
-  s.publish(nullptr);
-  s.ready = !scan;
+  if (!scan) s.ready = true;
+  s.loaded = true;
 }
 
 void HeightTables::begin_scan() {
   State& s = *state_;
-  if (s.ready || s.begun.exchange(true)) return;
+  if (!s.loaded || s.ready || s.begun.exchange(true)) return;
   const std::vector<geo::TileKey> jobs = surface::scan_jobs();
   s.scans.resize(jobs.size());
   s.unfinished = jobs.size();
@@ -126,6 +126,7 @@ void HeightTables::begin_scan() {
   }
 }
 
+const std::string& HeightTables::revision() const { return state_->revision; }
 bool HeightTables::ready() const { return state_->ready; }
 
 }  // namespace tellurion::globe

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "cache/block_cache.h"
 #include "globe/worker_pool.h"
@@ -17,15 +18,17 @@ class HeightTables {
  public:
   using Publish = std::function<void(std::shared_ptr<const surface::ErrorTable>)>;
 
-  /// `publish` gets the table at once (null, or a kept one) and again when it is made, on any thread.
+  /// `publish` gets the table when it has been loaded or made, on any thread.
   /// `blocks` and `pool` outlive the jobs.
   HeightTables(std::shared_ptr<const surface::SurfaceDescription> surface, cache::BlockCache& blocks,
                std::filesystem::path cache_folder, WorkerPool& pool, Publish publish);
   ~HeightTables();
 
-  /// Loads the table if it was kept. With `scan` false the estimates stay otherwise.
+  /// What the surface's heights are, as far as the table depends on them.
+  const std::string& revision() const;
+  /// Loads the table if it was kept; reads a file. With `scan` false the estimates stay otherwise.
   void load(bool scan);
-  /// Begins to make the table, once, if it was not kept; does not wait.
+  /// Begins to make the table, once, if it was not kept; does not wait. Nothing before it was looked for.
   void begin_scan();
   /// Whether the facts are final.
   bool ready() const;

@@ -174,6 +174,7 @@ void LayerCatalogue::begin() {
   {
     std::lock_guard lock(state_->mutex);
     if (std::exchange(state_->begun, true)) return;
+    state_->setting.publish(state_->catalogue);
   }
   if (unexamined_ > 0) state_->setting.look_into_more();
 }

@@ -35,7 +35,7 @@ class LayerCatalogue {
 
   /// What is known now.
   std::shared_ptr<const source::Catalogue> current() const;
-  /// From now on what is found out is published. Again: nothing.
+  /// What is known is published, and from now on what is found out. Again: nothing.
   void begin();
   /// Worker side: looks into some rasters whose footprint is not known, publishes what it found, and asks for another call if there are more.
   void examine_some();

@@ -24,9 +24,10 @@ std::optional<CatalogueFacts> catalogue_facts(const Globe& globe, std::size_t la
   return facts;
 }
 
-Result<ShownFootprints> with_footprints(World world, const std::vector<LayerInfo>& layers) {
+Result<ShownFootprints> with_footprints(World world, const Globe& told) {
   ShownFootprints shown{std::move(world), {}};
-  for (const LayerInfo& layer : layers) {
+  for (std::size_t i = 0; i < told.layer_count(); ++i) {
+    const LayerInfo& layer = told.layer(i);
     if (!layer.raster) continue;
     const bool wraps = layer.raster->description().wraps;
     if (!shown.middle || !wraps) shown.middle = source::middle_of(*layer.raster);

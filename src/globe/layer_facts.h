@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <optional>
-#include <vector>
 
 #include "base/result.h"
 #include "geo/geodetic.h"
@@ -31,7 +30,7 @@ struct ShownFootprints {
   std::optional<geo::LatLon> middle;  ///< of the last raster that does not go round the globe, or of any
 };
 
-/// Adds an overlay for each raster of `layers` that does not go round the globe.
-Result<ShownFootprints> with_footprints(World world, const std::vector<LayerInfo>& layers);
+/// Adds an overlay for each raster of the layers of `told` that does not go round the globe.
+Result<ShownFootprints> with_footprints(World world, const Globe& told);
 
 }  // namespace tellurion::globe

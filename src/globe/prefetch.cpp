@@ -100,8 +100,8 @@ void add_merged(std::vector<Prefetch::Part>& parts, std::size_t first, const Pre
 
 Result<Prefetch> Prefetch::plan(const Globe& globe, const PrefetchArea& area) {
   Prefetch plan;
-  for (std::size_t i = 0; i < globe.layers().size(); ++i) {
-    const LayerSpec& spec = globe.layers()[i].spec;
+  for (std::size_t i = 0; i < globe.layer_count(); ++i) {
+    const LayerSpec& spec = globe.layer(i).spec;
     const auto raster = globe.raster_at(i, area.time);
     if (!raster || !raster->description().is_remote) continue;
     auto reader = raster->open_reader();

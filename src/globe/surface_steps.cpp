@@ -34,21 +34,60 @@ surface::ImageUse use_of(LayerGroup group) {
 
 }  // namespace
 
-SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open)
-    : ellipsoid_(ellipsoid), open_(std::move(open)), next_id_(static_cast<std::uint32_t>(layers.size())) {
-  for (const LayerInfo& info : layers) {
-    OneLayer layer{info.spec, {}, info.raster, info.catalogue, info.spec};
-    if (info.spec.source.time) {
-      if (auto times = source::TimeSteps::create(*info.spec.source.time)) layer.timed = TimedLayer{std::move(*times), {}, {}, {}};
-      has_times_ = has_times_ || layer.timed.has_value();
-    }
-    order_.push_back(layers_.size());
-    layers_.push_back(std::move(layer));
-  }
-  // Groups draw in their order, whatever the file's.
-  std::ranges::stable_sort(order_, {}, [&](std::size_t i) { return layers_[i].spec.group; });
+SurfaceSteps::OneLayer::OneLayer(const LayerSpec& s) : spec(s), settings(s) {
+  if (!spec.source.time) return;
+  if (auto times = source::TimeSteps::create(*spec.source.time)) timed = TimedLayer{std::move(*times), {}, {}, {}};
 }
 
+SurfaceSteps::SurfaceSteps(const geo::Ellipsoid& ellipsoid, const std::vector<LayerInfo>& layers, OpenSource open) : ellipsoid_(ellipsoid), open_(std::move(open)) {
+  for (const LayerInfo& info : layers) {
+    OneLayer& layer = layers_[append(info.spec)];
+    layer.fixed = info.raster;
+    layer.catalogue = info.catalogue;
+  }
+}
+
+/// With the lock held.
+std::size_t SurfaceSteps::append(const LayerSpec& spec) {
+  const std::size_t added = layers_.size();
+  OneLayer& layer = layers_.emplace_back(spec);
+  layer.id = next_id_++;
+  has_times_ = has_times_ || layer.timed.has_value();
+  // Groups draw in their order, whatever the file's.
+  order_.insert(std::ranges::upper_bound(order_, spec.group, {}, [&](std::size_t i) { return layers_[i].spec.group; }), added);
+  return added;
+}
+
+SurfaceSteps::OneLayer& SurfaceSteps::layer_at(std::size_t layer) {
+  std::lock_guard lock(mutex_);
+  return layers_[layer];
+}
+
+std::size_t SurfaceSteps::add(const LayerSpec& spec) {
+  std::lock_guard lock(mutex_);
+  const std::size_t added = append(spec);
+  if (layers_[added].timed) {
+    surfaces_.clear();  // which of its steps they would show is not known
+  } else {
+    for (auto& [steps, surface] : surfaces_) steps.push_back(0);
+  }
+  return added;
+}
+
+void SurfaceSteps::remove(std::size_t layer) {
+  std::lock_guard lock(mutex_);
+  OneLayer& gone = layers_[layer];
+  if (gone.removed) return;
+  gone.removed = true;
+  gone.settings.enabled = false;
+  gone.fixed = nullptr;
+  gone.catalogue = nullptr;
+  if (gone.timed) gone.timed->open.clear();
+  std::erase(order_, layer);
+  describe_anew();
+}
+
+/// With the lock held.
 void SurfaceSteps::find_steps(const std::optional<UtcTime>& time, Steps& steps) const {
   steps.clear();
   for (const OneLayer& layer : layers_) steps.push_back(layer.timed ? layer.timed->times.step_at(time) : 0);
@@ -77,6 +116,7 @@ SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step)
     timed.failures.last_error = opened.error().message;
   }
   if (timed.ids.emplace(step, next_id_).second) ++next_id_;
+  if (layer.removed) return source;
   timed.open.emplace_front(step, source);
   if (timed.open.size() > kHeldSources) timed.open.pop_back();
   return source;
@@ -97,19 +137,27 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::held_at(const s
 }
 
 std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::optional<UtcTime>& time) {
-  if (auto same = held_at(time)) return same;
-  Steps steps;
-  find_steps(time, steps);
-  std::vector<Source> sources;
-  for (std::size_t i = 0; i < layers_.size(); ++i) {
-    sources.push_back(layers_[i].timed && settings(i).enabled ? source_of(layers_[i], steps[i]) : nullptr);
+  for (;;) {
+    if (auto same = held_at(time)) return same;
+    Steps steps;
+    std::vector<OneLayer*> timed;  // null: nothing of it is to be opened
+    {
+      std::lock_guard lock(mutex_);
+      find_steps(time, steps);
+      for (OneLayer& layer : layers_) timed.push_back(layer.timed && layer.settings.enabled ? &layer : nullptr);
+    }
+    std::vector<Source> sources;
+    for (std::size_t i = 0; i < timed.size(); ++i) sources.push_back(timed[i] ? source_of(*timed[i], steps[i]) : nullptr);
+    std::lock_guard lock(mutex_);
+    if (auto same = held(steps)) return same;
+    bool complete = steps.size() == layers_.size();
+    for (std::size_t i = 0; complete && i < timed.size(); ++i) complete = timed[i] || !layers_[i].timed || !layers_[i].settings.enabled;
+    if (!complete) continue;  // layers have been added or switched on meanwhile
+    auto description = describe(steps, sources);
+    surfaces_.emplace_front(std::move(steps), description);
+    if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
+    return description;
   }
-  std::lock_guard lock(mutex_);
-  if (auto same = held(steps)) return same;
-  auto description = describe(steps, sources);
-  surfaces_.emplace_front(std::move(steps), description);
-  if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
-  return description;
 }
 
 /// With the lock held. `sources` are those of layers with times.
@@ -125,7 +173,7 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::describe(const 
     layer.source = source;
     layer.catalogue = one.catalogue;
     layer.name = one.spec.name;
-    layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : static_cast<std::uint32_t>(i);
+    layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : one.id;
     layer.opacity = static_cast<float>(one.settings.opacity);
     layer.gamma = static_cast<float>(one.settings.gamma);
     layer.multiplier = static_cast<float>(one.settings.multiplier);
@@ -160,18 +208,21 @@ void SurfaceSteps::describe_anew() {
 
 void SurfaceSteps::set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue) {
   std::lock_guard lock(mutex_);
+  if (layers_[layer].removed) return;
   layers_[layer].catalogue = std::move(catalogue);
   describe_anew();
 }
 
 void SurfaceSteps::set_source(std::size_t layer, std::shared_ptr<const source::RasterSource> source) {
   std::lock_guard lock(mutex_);
+  if (layers_[layer].removed) return;
   layers_[layer].fixed = std::move(source);
   describe_anew();
 }
 
 void SurfaceSteps::set_settings(std::size_t layer, const LayerSettings& settings) {
   std::lock_guard lock(mutex_);
+  if (layers_[layer].removed) return;
   layers_[layer].settings = settings;
   describe_anew();
 }
@@ -179,6 +230,7 @@ void SurfaceSteps::set_settings(std::size_t layer, const LayerSettings& settings
 bool SurfaceSteps::move(std::size_t layer, bool up) {
   std::lock_guard lock(mutex_);
   const auto here = std::ranges::find(order_, layer);
+  if (here == order_.end()) return false;
   if (up ? std::next(here) == order_.end() : here == order_.begin()) return false;
   const auto other = up ? std::next(here) : std::prev(here);
   if (layers_[*other].spec.group != layers_[layer].spec.group) return false;
@@ -198,20 +250,21 @@ std::vector<std::size_t> SurfaceSteps::order() const {
 }
 
 std::shared_ptr<const source::RasterSource> SurfaceSteps::raster_at(std::size_t layer, const std::optional<UtcTime>& time) {
-  OneLayer& one = layers_[layer];
+  OneLayer& one = layer_at(layer);
   if (one.timed) return settings(layer).enabled ? source_of(one, one.timed->times.step_at(time)) : nullptr;
   std::lock_guard lock(mutex_);
   return one.fixed;
 }
 
 std::string SurfaceSteps::text_of(std::size_t layer, const std::optional<UtcTime>& time) const {
+  std::lock_guard lock(mutex_);
   const auto& timed = layers_[layer].timed;
   return timed ? timed->times.text(timed->times.step_at(time)) : std::string();
 }
 
 std::vector<std::uint32_t> SurfaceSteps::source_ids(std::size_t layer) const {
-  std::vector<std::uint32_t> ids{static_cast<std::uint32_t>(layer)};
   std::lock_guard lock(mutex_);
+  std::vector<std::uint32_t> ids{layers_[layer].id};
   if (const auto& timed = layers_[layer].timed) {
     for (const auto& [step, id] : timed->ids) ids.push_back(id);
   }

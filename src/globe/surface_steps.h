@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <list>
 #include <map>
@@ -35,8 +36,12 @@ class SurfaceSteps {
   /// The same, but opens nothing: null if it is not among the last few.
   std::shared_ptr<const surface::SurfaceDescription> held_at(const std::optional<UtcTime>& time);
 
-  // From now on. What is held is described anew, without opening anything.
+  // From now on. What is held is described anew, without opening anything; a layer that has been removed stays so.
 
+  /// Another layer, over the others of its group: the number after the last. Shows nothing before it has a source, a catalogue or times.
+  std::size_t add(const LayerSpec& spec);
+  /// Lets go of what is open of it. The others keep their numbers.
+  void remove(std::size_t layer);
   /// A layer shows another catalogue.
   void set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
   /// A layer without times that had no source has one.
@@ -46,7 +51,7 @@ class SurfaceSteps {
   bool move(std::size_t layer, bool up);
 
   LayerSettings settings(std::size_t layer) const;
-  /// All layers, the lowest first.
+  /// All layers that have not been removed, the lowest first.
   std::vector<std::size_t> order() const;
 
   /// A layer's source at `time`; null: it has none.
@@ -74,15 +79,21 @@ class SurfaceSteps {
     Failures failures;
   };
   struct OneLayer {
-    LayerSpec spec;                   ///< as the world was opened
-    std::optional<TimedLayer> timed;
+    explicit OneLayer(const LayerSpec& s);
+
+    const LayerSpec spec;             ///< with the settings that it began with
+    std::optional<TimedLayer> timed;  ///< its times never change; the rest is guarded as what follows
     // Guarded by mutex_:
+    std::uint32_t id = 0;             ///< number in the block cache; steps have their own
     Source fixed;                     ///< null: it has times, or has not been opened
     std::shared_ptr<const source::Catalogue> catalogue;
     LayerSettings settings;
+    bool removed = false;
   };
   using Steps = std::vector<std::int64_t>;  ///< of every layer; 0 of those without times
 
+  OneLayer& layer_at(std::size_t layer);
+  std::size_t append(const LayerSpec& spec);
   void find_steps(const std::optional<UtcTime>& time, Steps& steps) const;
   /// Opens it if it is not open, without the lock.
   Source source_of(OneLayer& layer, std::int64_t step);
@@ -92,10 +103,10 @@ class SurfaceSteps {
 
   geo::Ellipsoid ellipsoid_;
   OpenSource open_;
-  std::vector<OneLayer> layers_;
-  bool has_times_ = false;          ///< some layer has
 
   mutable std::mutex mutex_;        ///< guards what follows and what the timed layers have open; never held while a source is opened
+  std::deque<OneLayer> layers_;     ///< stay where they are
+  bool has_times_ = false;          ///< some layer has
   std::vector<std::size_t> order_;  ///< in which layers are drawn
   std::uint32_t next_id_ = 0;
   std::uint64_t last_revision_ = 0;

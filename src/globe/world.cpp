@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <initializer_list>
 #include <limits>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,6 +12,7 @@
 
 #include "fetch/transfer.h"
 #include "geo/body.h"
+#include "globe/world_text.h"
 #include "source/tiles/height_decoders.h"
 
 namespace tellurion::globe {
@@ -433,18 +432,11 @@ Result<void> check(const LayerSettings& settings, LayerGroup group) {
 }
 
 Result<World> load_world(const std::filesystem::path& file) {
-  constexpr std::uintmax_t kLargest = 16u << 20;
+  const auto text = read_whole(file);
+  if (!text) return text.error();
   std::error_code failure;
-  if (!std::filesystem::is_regular_file(file, failure))
-    return Error{ErrorCode::not_found, fmt::format("{}: there is no such world file", file.string())};
-  if (std::filesystem::file_size(file, failure) > kLargest)
-    return Error{ErrorCode::unsupported, fmt::format("{}: a world file has at most 16 MB", file.string())};
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream) return Error{ErrorCode::unavailable, fmt::format("{}: cannot be read", file.string())};
   const auto absolute = std::filesystem::absolute(file, failure);
-  auto world = parse_world(text.str(), absolute.parent_path(), file.string());
+  auto world = parse_world(*text, absolute.parent_path(), file.string());
   if (world) world->file = absolute;
   return world;
 }

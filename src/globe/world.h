@@ -145,4 +145,7 @@ Result<World> resolve_world(const std::string& argument);
 /// invalid_argument (a world file, a list of nothing).
 Result<World> world_of_data(const std::string& data, bool is_list = false);
 
+/// The layer of such a world, for another one. Errors: invalid_argument (they are of different bodies).
+Result<LayerSpec> layer_for(const World& world, const World& data);
+
 }  // namespace tellurion::globe

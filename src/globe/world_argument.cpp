@@ -134,7 +134,7 @@ Result<World> resolve_world(const std::string& argument) {
 Result<World> world_of_data(const std::string& data, bool is_list) {
   std::error_code failure;
   const std::filesystem::path path = std::filesystem::absolute(data, failure).lexically_normal();
-  if (path.extension() == ".toml" || data.empty()) return Error{ErrorCode::invalid_argument, fmt::format("{}: a world file is no data of a layer", data)};
+  if (path.extension() == ".toml" || data.empty()) return Error{ErrorCode::invalid_argument, fmt::format("{}: a world file is no data of a layer; `tellurion view` opens it", data)};
   if (!is_list && !std::filesystem::is_directory(path, failure)) {
     auto world = resolve_world(data);
     if (!world) return world;
@@ -153,6 +153,13 @@ Result<World> world_of_data(const std::string& data, bool is_list) {
   layer.source.path = path;
   world->layers = {layer};
   return world;
+}
+
+Result<LayerSpec> layer_for(const World& world, const World& data) {
+  const LayerSpec& layer = data.layers.front();
+  if (data.planet != world.planet && !(data.ellipsoid == world.ellipsoid))
+    return Error{ErrorCode::invalid_argument, fmt::format("{} lies on {}, but this is a world of {}", layer.name, data.planet, world.planet)};
+  return layer;
 }
 
 }  // namespace tellurion::globe

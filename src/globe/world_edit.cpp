@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -275,11 +275,9 @@ Result<void> edit_world(const std::filesystem::path& file, const World& begin, c
   if (Result<void> locked = lock.lock(file); !locked) return locked;
   const auto edit = [&]() -> Result<void> {
     const auto target = std::filesystem::canonical(file, failure);  // a link stays a link
-    if (auto readable = load_world(target); !readable && !is_new) return readable.error();
-    std::ifstream stream(target, std::ios::binary);
-    std::string text(std::istreambuf_iterator<char>(stream), {});
-    if (text.empty()) text = planet_to_toml(begin);
-    auto world = WorldText::parse(std::move(text), target.parent_path(), file.string());
+    auto text = read_whole(target);
+    if (!text) return text.error();
+    auto world = WorldText::parse(text->empty() ? planet_to_toml(begin) : std::move(*text), target.parent_path(), file.string());
     if (!world) return world.error();
     if (Result<void> changed = change(*world); !changed) return changed;
     return write_whole(target, world->text());
@@ -297,31 +295,74 @@ std::string without_settings(LayerSpec layer) {
   return to_toml(layer, {});
 }
 
-Result<void> put_in(const Globe& globe, WorldText& world) {
-  // Where each layer stands in the file, which may have been changed since it was opened.
-  std::vector<std::size_t> place;
-  for (const LayerSpec& layer : globe.world().layers) {
-    std::size_t i = 0;
-    const auto& written = world.world().layers;
-    while (i < written.size() && (std::ranges::find(place, i) != place.end() || without_settings(written[i]) != without_settings(layer))) ++i;
-    if (i == written.size())
-      return {ErrorCode::unsupported, fmt::format("{}: has no layer \"{}\" any more as it was opened; nothing has been saved", globe.world().file.string(), layer.name)};
-    place.push_back(i);
+/// Where each of `layers` stands in the file, which may have been changed since it was opened; nothing for those that are not in it.
+std::map<std::size_t, std::size_t> places_of(const std::vector<std::size_t>& layers, const Globe& globe, const World& written) {
+  std::map<std::size_t, std::size_t> places;
+  std::vector<bool> is_taken(written.layers.size());
+  for (const std::size_t layer : layers) {
+    for (std::size_t i = 0; i < written.layers.size(); ++i) {
+      if (is_taken[i] || without_settings(written.layers[i]) != without_settings(globe.layer(layer).spec)) continue;
+      is_taken[i] = true;
+      places.emplace(layer, i);
+      break;
+    }
   }
-  for (std::size_t i = 0; i < place.size(); ++i) {
-    if (Result<void> set = world.set_settings(place[i], globe.layer_settings(i)); !set) return set;
+  return places;
+}
+
+LayerSpec with_settings(const Globe& globe, std::size_t layer) {
+  LayerSpec spec = globe.layer(layer).spec;
+  static_cast<LayerSettings&>(spec) = globe.layer_settings(layer);
+  return spec;
+}
+
+/// The layers that a file can hold, the lowest first: what a program draws itself is in no file.
+std::vector<std::size_t> layers_to_keep(const Globe& globe) {
+  std::vector<std::size_t> layers = globe.layer_order();
+  std::erase_if(layers, [&](std::size_t i) { return globe.layer(i).spec.source.raster != nullptr; });
+  return layers;
+}
+
+Result<void> put_in(const Globe& globe, KeptLayers& kept, WorldText& world) {
+  const std::vector<std::size_t> order = layers_to_keep(globe);
+  // Those that are in the file, and behind them those that were.
+  std::vector<std::size_t> known;
+  std::ranges::copy_if(order, std::back_inserter(known), [&](std::size_t i) { return kept.layers.contains(i); });
+  std::ranges::sort(known);
+  const std::size_t present = known.size();
+  std::ranges::copy_if(kept.layers, std::back_inserter(known), [&](std::size_t i) { return std::ranges::find(order, i) == order.end(); });
+  std::map<std::size_t, std::size_t> place = places_of(known, globe, world.world());
+  for (std::size_t n = 0; n < present; ++n) {
+    if (!place.contains(known[n]))
+      return {ErrorCode::unsupported, fmt::format("{}: has no layer \"{}\" any more as it was opened; nothing has been saved", kept.file.string(), globe.layer(known[n]).spec.name)};
+  }
+  for (std::size_t n = present; n < known.size(); ++n) {
+    const auto found = place.find(known[n]);
+    if (found == place.end()) continue;  // somebody else has removed it too
+    const std::size_t gone = found->second;
+    if (Result<void> removed = world.remove_layer(gone); !removed) return removed;
+    place.erase(found);
+    for (auto& [layer, other] : place) other -= other > gone ? 1 : 0;
+  }
+  for (const std::size_t i : order) {
+    if (place.contains(i)) {
+      if (Result<void> set = world.set_settings(place[i], globe.layer_settings(i)); !set) return set;
+    } else {
+      if (Result<void> added = world.add_layer(with_settings(globe, i)); !added) return added;
+      place[i] = world.world().layers.size() - 1;
+    }
   }
   // Each follows the one below it in its group.
-  const std::vector<std::size_t> order = globe.layer_order();
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    const std::size_t above = place[order[i]], below = place[order[i - 1]];
-    if (globe.world().layers[order[i]].group != globe.world().layers[order[i - 1]].group || above > below) continue;
+  for (std::size_t n = 1; n < order.size(); ++n) {
+    const std::size_t above = place[order[n]], below = place[order[n - 1]];
+    if (globe.layer(order[n]).spec.group != globe.layer(order[n - 1]).spec.group || above > below) continue;
     if (Result<void> moved = world.move_behind(above, below); !moved) return moved;
-    for (std::size_t& other : place) {
+    for (auto& [layer, other] : place) {
       if (other == above) other = below;
       else if (other > above && other <= below) --other;
     }
   }
+  kept.layers = {order.begin(), order.end()};
   return {};
 }
 
@@ -331,24 +372,34 @@ bool is_default(const std::filesystem::path& file) {
   return folder && std::filesystem::equivalent(*folder / "world.toml", file, failure);
 }
 
-}  // namespace
-
-Result<std::filesystem::path> save_layers(const Globe& globe, const std::filesystem::path& folder) {
-  const std::filesystem::path& file = globe.world().file;
-  if (!file.empty() && !is_default(file)) {
-    if (Result<void> edited = edit_world(file, globe.world(), [&](WorldText& world) { return put_in(globe, world); }); !edited) return edited.error();
-    return file;
-  }
+/// A new file of all layers.
+Result<void> put_in_new(const Globe& globe, KeptLayers& kept, const std::filesystem::path& folder) {
+  const std::vector<std::size_t> order = layers_to_keep(globe);
   World world = globe.world();
   world.layers.clear();
-  for (const std::size_t i : globe.layer_order()) {
-    world.layers.push_back(globe.world().layers[i]);
-    static_cast<LayerSettings&>(world.layers.back()) = globe.layer_settings(i);
-  }
-  std::filesystem::path made = folder / "world.toml";
-  for (int n = 2; std::filesystem::exists(made); ++n) made = folder / fmt::format("world-{}.toml", n);
-  if (Result<void> written = save_world(world, made); !written) return written.error();
-  return made;
+  for (const std::size_t i : order) world.layers.push_back(with_settings(globe, i));
+  std::error_code failure;
+  const std::filesystem::path whole_folder = std::filesystem::absolute(folder.empty() ? "." : folder, failure).lexically_normal();
+  std::filesystem::path made = whole_folder / "world.toml";
+  for (int n = 2; std::filesystem::exists(made, failure); ++n) made = whole_folder / fmt::format("world-{}.toml", n);
+  if (Result<void> written = save_world(world, made); !written) return written;
+  kept = {made, {order.begin(), order.end()}};
+  return {};
+}
+
+}  // namespace
+
+Result<std::filesystem::path> save_layers(Globe& globe, const std::filesystem::path& folder) {
+  std::filesystem::path file;
+  const Result<void> saved = globe.change_kept_layers([&](KeptLayers& kept) -> Result<void> {
+    Result<void> written = kept.file.empty() || is_default(kept.file)
+                               ? put_in_new(globe, kept, folder)
+                               : edit_world(kept.file, globe.world(), [&](WorldText& world) { return put_in(globe, kept, world); });
+    file = kept.file;
+    return written;
+  });
+  if (!saved) return saved.error();
+  return file;
 }
 
 }  // namespace tellurion::globe

@@ -53,9 +53,10 @@ class WorldText {
 /// is begun with the planet of `begin`. Errors: those of load_world and of `change`; unavailable.
 Result<void> edit_world(const std::filesystem::path& file, const World& begin, const std::function<Result<void>(WorldText&)>& change);
 
-/// Keeps settings and order of layers as they are now in the world's file, where all else stays as it is. A world that is no file of the
-/// user's, as the default one or a raster, becomes a new file in `folder`. Gives the file. Errors: those of edit_world; unsupported (a
-/// layer is not in the file any more).
-Result<std::filesystem::path> save_layers(const Globe& globe, const std::filesystem::path& folder);
+/// Keeps the layers as they are now in the world's file, where all else stays as it is: those that were added are put in, those that were
+/// removed taken out. A world that is no file of the user's, as the default one or a raster, becomes a new file in `folder`, into which
+/// later calls write too. Layers that a program draws itself are left out. Gives the file. Errors: those of edit_world; unsupported (a layer
+/// is not in the file any more). Thread-safe; reads and writes files.
+Result<std::filesystem::path> save_layers(Globe& globe, const std::filesystem::path& folder);
 
 }  // namespace tellurion::globe

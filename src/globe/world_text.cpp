@@ -183,6 +183,20 @@ std::string to_toml(const World& world) {
   return text_of(toml::table{{"planet", planet_table(world)}, {"layer", std::move(layers)}}) + "\n";
 }
 
+Result<std::string> read_whole(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kLargest = 16u << 20;
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(file, failure))
+    return Error{ErrorCode::not_found, fmt::format("{}: there is no such world file", file.string())};
+  if (std::filesystem::file_size(file, failure) > kLargest)
+    return Error{ErrorCode::unsupported, fmt::format("{}: a world file has at most 16 MB", file.string())};
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) return Error{ErrorCode::unavailable, fmt::format("{}: cannot be read", file.string())};
+  return text.str();
+}
+
 Result<void> write_whole(const std::filesystem::path& file, const std::string& text) {
   const std::filesystem::path part = file.string() + ".part";
   {

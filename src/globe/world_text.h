@@ -23,6 +23,9 @@ std::string planet_to_toml(const World& world);
 /// A path, or URL, as a world file in `folder` names it: relative if it lies below.
 std::string name_in(const std::string& path, const std::filesystem::path& folder);
 
+/// A world file's text. Errors: not_found, unsupported (too large), unavailable.
+Result<std::string> read_whole(const std::filesystem::path& file);
+
 /// Writes `text` to `file`, whole or not at all, with the rights that the file has. Errors: unavailable.
 Result<void> write_whole(const std::filesystem::path& file, const std::string& text);
 

@@ -221,6 +221,11 @@ FrameFigures Renderer::State::draw_plain(gpu::RenderThread& thread, const view::
   return figures;
 }
 
+void Renderer::allow_overlays(gpu::RenderThread& thread) {
+  thread.check();
+  state_->options.overlays = true;
+}
+
 bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   // One triangle through every variant, into targets of the same kinds: drivers compile at the first draw.
   thread.check();

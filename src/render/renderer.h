@@ -83,6 +83,9 @@ class Renderer {
   std::uint64_t bytes_uploaded() const;      ///< since creation
   std::size_t colour_slots_free() const;
 
+  /// From now on tiles may have overlays; the next frame may have to compile for that.
+  void allow_overlays(gpu::RenderThread& thread);
+
   /// Compiles what `look` needs, so that the first frame with it does not stall; false if that was done before.
   bool warm_up(gpu::RenderThread& thread, const FrameLook& look);
 

@@ -6,8 +6,8 @@
 What the camera does is read from --camera-log and held against the mathematics of _common.py; what is drawn is read back
 from the screen.
 """
-import ctypes
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,8 +15,10 @@ import time
 import unittest
 
 import numpy as np
+from osgeo import gdal
 
 from _common import EARTH, PROGRAM, ROOT, Camera, Case, GeographicRaster, angle_between, camera_text, read_picture, read_trace
+from _x11 import ask_to_close, drop_files
 
 SIZE = (640, 480)
 MIDDLE = (SIZE[0] / 2, SIZE[1] / 2)
@@ -33,27 +35,6 @@ def run_on_display_in_memory():
         sys.exit(77)
     os.environ["TELLURION_ON_XVFB"] = "1"
     os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24 -nolisten tcp -noreset -r", sys.executable, *sys.argv])
-
-
-def ask_to_close(window):
-    """What a window manager sends when the user presses a window's closing button (ICCCM 4.2.8.1)."""
-    class ClientMessage(ctypes.Structure):
-        _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int), ("display", ctypes.c_void_p),
-                    ("window", ctypes.c_ulong), ("message_type", ctypes.c_ulong), ("format", ctypes.c_int),
-                    ("data", ctypes.c_long * 5), ("rest", ctypes.c_char * 200)]
-
-    x = ctypes.CDLL("libX11.so.6")
-    x.XOpenDisplay.restype = ctypes.c_void_p
-    x.XInternAtom.restype = ctypes.c_ulong
-    x.XInternAtom.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]
-    x.XSendEvent.argtypes = [ctypes.c_void_p, ctypes.c_ulong, ctypes.c_int, ctypes.c_long, ctypes.c_void_p]
-    x.XCloseDisplay.argtypes = [ctypes.c_void_p]
-    display = x.XOpenDisplay(None)
-    protocols, delete = x.XInternAtom(display, b"WM_PROTOCOLS", 0), x.XInternAtom(display, b"WM_DELETE_WINDOW", 0)
-    event = ClientMessage(type=33, display=display, window=window, message_type=protocols, format=32)
-    event.data[0] = delete
-    x.XSendEvent(display, window, 0, 0, ctypes.byref(event))
-    x.XCloseDisplay(display)
 
 
 class Viewer:
@@ -117,6 +98,12 @@ class Viewer:
 
     def hold(self, key, seconds):
         self.do("keydown", key, "sleep", seconds, "keyup", key)
+        self.settle()
+
+    def drop(self, *files):
+        """Drops files on the window's middle; all that comes of it is drawn when this ends."""
+        self.frames_before = self.frames()
+        drop_files(self.window, files, MIDDLE)
         self.settle()
 
     def frames(self):
@@ -299,6 +286,79 @@ class Picture(WindowTest):
         click(save)
         self.assertLess(file.read_text().index("Lights"), file.read_text().index("# below"))
         self.assertEqual(viewer.close(), 0)
+
+    def raster(self, name, *bands, kind=gdal.GDT_Byte):
+        """Samples, the same in all places or 64 x 64, of 6 to 10 degrees east and 44 to 47 north."""
+        file = self.folder / name
+        file.parent.mkdir(exist_ok=True)
+        data = gdal.GetDriverByName("GTiff").Create(str(file), 64, 64, len(bands), kind)
+        data.SetGeoTransform((6.0, 4 / 64, 0.0, 47.0, 0.0, -3 / 64))
+        data.SetProjection("EPSG:4326")
+        for number, samples in enumerate(bands, 1):
+            data.GetRasterBand(number).WriteArray(np.full((64, 64), samples, float))
+        return file
+
+    def test_dropped_files_become_layers_for_this_run_or_are_kept(self):
+        text = '# My world.\n[[layer]]\nname = "Marble"\ngroup = "color"\nsource = { path = "%s" }\n' % (ROOT / "data/earth/blue_marble.tif")
+        file = self.folder / "dropped.toml"
+        file.write_text(text)
+        red = self.raster("red.tif", 200, 30, 30)
+        hills = self.raster("hills.tif", 3000 + 2900 * np.sin(np.arange(64) / 4), kind=gdal.GDT_Int16)
+        self.raster("many/green.tif", 30, 200, 30)
+        bad = self.folder / "bad.tif"
+        bad.write_text("no raster")
+        viewer = self.open(ALPS, world=[file])
+        beside = np.s_[:, 440:]  # of the panel of layers
+        remove, fly, save = (120, 250), (52, 250), (88, 92)
+
+        def click(point):
+            viewer.do(*viewer.at(point), "sleep", HELD, "mousedown", 1, "sleep", HELD, "mouseup", 1)
+            viewer.settle()
+
+        def share_of(colour, picture):
+            others = np.delete(picture, colour, axis=-1).max(axis=-1)
+            return (picture[..., colour] > 1.8 * others).mean()
+
+        start = viewer.screen("before_drop")
+        self.assertLess(share_of(0, start), 0.01)
+        viewer.drop(red)
+        self.assertGreater(share_of(0, viewer.screen("dropped_red")), 0.3)
+        viewer.drop(hills, bad, file, self.folder / "many")
+        viewer.key("F3")
+        viewer.key("l", "l")  # redrawn
+        self.assertGreater(share_of(1, viewer.screen("dropped_folder")[beside]), 0.1)
+        self.assertEqual(file.read_text(), text)
+        click(save)
+        time.sleep(12.5)  # what is told of them goes
+        viewer.key("l", "l")
+        shown = viewer.screen("dropped_all")[beside]
+        self.assertTrue(file.read_text().startswith(text))
+        listed = self.tellurion("world", "list", file).stdout
+        for line in (r"1  color +Marble\n", r"height +hills.tif\n", r"color +red.tif\n", r"color +many\n +catalogue "):
+            self.assertRegex(listed, line)
+        self.assertNotIn("bad.tif", listed)
+        drawn = read_picture(self.render(file, ALPS, "--size", f"{SIZE[0]}x{SIZE[1]}"))[SEEN][beside]
+        self.assertLess((np.abs(shown - drawn)[100:].max(axis=-1) > 12).mean(), 0.01)  # of the rows below the hint
+        click(remove)  # the uppermost: the folder
+        self.assertGreater(share_of(0, viewer.screen("removed_folder")[beside]), 0.1)
+        click(remove)
+        self.assertLess(share_of(0, viewer.screen("removed_red")[beside]), 0.01)
+        click(save)
+        listed = self.tellurion("world", "list", file).stdout
+        self.assertNotIn("red.tif", listed)
+        self.assertNotIn("many", listed)
+        viewer.drop(red)
+        before = viewer.pose()
+        click(fly)
+        time.sleep(3.0)
+        viewer.settle()
+        self.assertAlmostEqual(viewer.pose()[0], 45.5, delta=0.1)
+        self.assertAlmostEqual(viewer.pose()[1], 8.0, delta=0.1)
+        self.assertNotEqual(viewer.pose()[2], before[2])
+        self.assertEqual(viewer.close(), 0)
+        told = viewer.process.stderr.read()
+        self.assertEqual(len(re.findall(r"^tellurion: .*(bad\.tif: no raster|dropped\.toml: a world file)", told, re.M)), 2, told)
+        self.assertNotIn("red.tif", self.tellurion("world", "list", file).stdout)
 
     def test_opengl_es_shows_the_same(self):
         pictures = []

@@ -7,20 +7,20 @@
 
 #include <doctest/doctest.h>
 
-#include "globe/globe.h"
-#include "globe/globe_view.h"
+#include "globe/show.h"
 #include "source/catalogue/catalogue.h"
 #include "source/made_raster.h"
 
 using namespace tellurion;
 using namespace tellurion::globe;
+using tellurion::globe::test::kPatience;
+using tellurion::globe::test::Show;
 using tellurion::test::MadeFile;
 using tellurion::test::MadeRaster;
 
 namespace {
 
 constexpr int kSide = 128;
-constexpr std::chrono::seconds kPatience{60};
 
 /// Ten degrees by ten of hills and of stripes, whose south-west corner lies at `west`, 40 degrees north.
 struct Piece {
@@ -57,36 +57,10 @@ World world_of(const std::vector<const Piece*>& pieces) {
   return world;
 }
 
-/// A globe and a view of it over the border of two pieces.
-struct Show {
-  Show(gpu::RenderThread& thread, const std::vector<const Piece*>& pieces, int workers) {
-    GlobeOptions options;
-    options.workers = workers;
-    auto opened = Globe::open(world_of(pieces), options);
-    REQUIRE(opened.has_value());
-    globe = std::move(*opened);
-    auto made = GlobeView::create(*globe, thread, std::size_t{64} << 20);
-    REQUIRE(made.has_value());
-    view = std::move(*made);
-    view::Pose pose;
-    pose.position = {to_radians(Degrees(41.0)), to_radians(Degrees(20.3)), EllipsoidalHeight(300e3)};
-    pose.pitch = to_radians(Degrees(-50.0));
-    camera = view::make_camera(globe->ellipsoid(), pose, to_radians(Degrees(45.0)), 320, 200);
-  }
+/// Over the border of two pieces.
+struct Pieces : Show {
+  Pieces(gpu::RenderThread& thread, const std::vector<const Piece*>& pieces, int workers) : Show(thread, world_of(pieces), workers) {}
 
-  std::vector<std::uint8_t> finished_picture() {
-    REQUIRE(view->finish(camera, {}, std::chrono::steady_clock::now() + kPatience));
-    return view->picture(camera, {}).rgba;
-  }
-  /// Frames that wait for nothing, until one shows all.
-  std::vector<std::uint8_t> picture_after_frames() {
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    do {
-      REQUIRE(std::chrono::steady_clock::now() < deadline);
-      (void)view->update(camera, {}, 5.0);
-    } while (!view->stats().complete);
-    return view->picture(camera, {}).rgba;
-  }
   void insert(const Piece& piece) {
     REQUIRE(globe->insert(0, {piece.heights.path()}).has_value());
     REQUIRE(globe->insert(1, {piece.colours.path()}).has_value());
@@ -95,10 +69,6 @@ struct Show {
     REQUIRE(globe->remove(0, {piece.heights.path()}).has_value());
     REQUIRE(globe->remove(1, {piece.colours.path()}).has_value());
   }
-
-  std::unique_ptr<Globe> globe;
-  std::unique_ptr<GlobeView> view;
-  view::Camera camera;
 };
 
 }  // namespace
@@ -107,14 +77,14 @@ TEST_CASE("rasters put into a catalogue and taken out show and vanish, as if the
   const Piece west("west", 10.0, 0.0), east("east", 20.0, 1.0);
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   REQUIRE(thread.has_value());
-  Show all(**thread, {&west, &east}, 0);
-  Show one(**thread, {&west}, 0);
+  Pieces all(**thread, {&west, &east}, 0);
+  Pieces one(**thread, {&west}, 0);
   const auto of_all = all.finished_picture();
   const auto of_one = one.finished_picture();
   REQUIRE(of_all != of_one);
   for (const int workers : {0, 2}) {
     CAPTURE(workers);
-    Show changing(**thread, {&west}, workers);
+    Pieces changing(**thread, {&west}, workers);
     changing.insert(east);  // before anything is shown
     CHECK((changing.picture_after_frames() == of_all));
     changing.remove(east);
@@ -129,9 +99,9 @@ TEST_CASE("a catalogue that was empty shows what comes, and is empty again when 
   const Piece west("first", 10.0, 0.0), east("second", 20.0, 1.0);
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   REQUIRE(thread.has_value());
-  Show all(**thread, {&west, &east}, 0);
+  Pieces all(**thread, {&west, &east}, 0);
   const auto of_all = all.finished_picture();
-  Show changing(**thread, {}, 2);
+  Pieces changing(**thread, {}, 2);
   const auto of_none = changing.finished_picture();
   changing.insert(east);
   for (int frame = 0; frame < 3; ++frame) (void)changing.view->update(changing.camera, {}, 5.0);  // some tiles without the other
@@ -146,11 +116,11 @@ TEST_CASE("a raster of the same path takes the place of the one before") {
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   REQUIRE(thread.has_value());
   auto piece = std::make_unique<Piece>("changing", 20.0, 0.0);
-  Show show(**thread, {piece.get()}, 0);
+  Pieces show(**thread, {piece.get()}, 0);
   const auto before = show.finished_picture();
   piece.reset();
   piece = std::make_unique<Piece>("changing", 20.0, 2.0);
-  const auto expected = Show(**thread, {piece.get()}, 0).finished_picture();
+  const auto expected = Pieces(**thread, {piece.get()}, 0).finished_picture();
   REQUIRE(expected != before);
   show.insert(*piece);
   CHECK((show.finished_picture() == expected));
@@ -160,7 +130,7 @@ TEST_CASE("what is put into a layer that is no catalogue, and a file that is non
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   REQUIRE(thread.has_value());
   const Piece west("only", 10.0, 0.0);
-  Show show(**thread, {&west}, 0);
+  Pieces show(**thread, {&west}, 0);
   CHECK(show.globe->insert(7, {"a.tif"}).error().code == ErrorCode::invalid_argument);
   CHECK(show.globe->remove(7, {"a.tif"}).error().code == ErrorCode::invalid_argument);
   const auto before = show.finished_picture();
@@ -175,12 +145,12 @@ TEST_CASE("a view of a catalogue alone begins over what it has, one of nothing o
   auto thread = gpu::RenderThread::headless(gpu::Api::core);
   REQUIRE(thread.has_value());
   const Piece west("home_west", 10.0, 0.0), east("home_east", 20.0, 1.0);
-  Show show(**thread, {&west, &east}, 0);
+  Pieces show(**thread, {&west, &east}, 0);
   REQUIRE(show.globe->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience));
   const view::Pose home = show.globe->home();
   CHECK(to_degrees(home.position.latitude).value == doctest::Approx(45.0).epsilon(0.01));  // 40 to 50 north,
   CHECK(to_degrees(home.position.longitude).value == doctest::Approx(20.0).epsilon(0.001));  // 10 to 30 east
   CHECK(home.position.height.value > 1e6);
   CHECK(home.position.height.value < 4e6);
-  CHECK(Show(**thread, {}, 0).globe->home().position.height.value > 1e7);
+  CHECK(Pieces(**thread, {}, 0).globe->home().position.height.value > 1e7);
 }

@@ -16,20 +16,20 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include "globe/globe.h"
-#include "globe/globe_view.h"
+#include "globe/show.h"
 #include "globe/world_edit.h"
 #include "source/made_raster.h"
 
 using namespace tellurion;
 using namespace tellurion::globe;
+using tellurion::globe::test::kPatience;
+using tellurion::globe::test::Show;
 using tellurion::test::MadeFile;
 using tellurion::test::MadeRaster;
 
 namespace {
 
 constexpr int kSide = 128;
-constexpr std::chrono::seconds kPatience{60};
 
 std::vector<double> waves(double phase, double mean, double swing) {
   std::vector<double> values;
@@ -70,32 +70,6 @@ World world_of(const Files& files) {
                   layer_of(files.green, LayerGroup::color), layer_of(files.blue, LayerGroup::color, false)};
   return world;
 }
-
-struct Show {
-  Show(gpu::RenderThread& thread, const World& world, int workers) {
-    GlobeOptions options;
-    options.workers = workers;
-    auto opened = Globe::open(world, options);
-    REQUIRE(opened.has_value());
-    globe = std::move(*opened);
-    auto made_view = GlobeView::create(*globe, thread, std::size_t{64} << 20);
-    REQUIRE(made_view.has_value());
-    view = std::move(*made_view);
-    view::Pose pose;
-    pose.position = {to_radians(Degrees(41.0)), to_radians(Degrees(20.3)), EllipsoidalHeight(300e3)};
-    pose.pitch = to_radians(Degrees(-50.0));
-    camera = view::make_camera(globe->ellipsoid(), pose, to_radians(Degrees(45.0)), 320, 200);
-  }
-
-  std::vector<std::uint8_t> finished_picture() {
-    REQUIRE(view->finish(camera, {}, std::chrono::steady_clock::now() + kPatience));
-    return view->picture(camera, {}).rgba;
-  }
-
-  std::unique_ptr<Globe> globe;
-  std::unique_ptr<GlobeView> view;
-  view::Camera camera;
-};
 
 }  // namespace
 
@@ -169,6 +143,196 @@ TEST_CASE("set_layer and move_layer: what cannot be is said, and nothing changes
   CHECK(globe->source_stats()[5].last_error.find("/nowhere/at/all.tif") != std::string::npos);
 }
 
+TEST_CASE("layers that are added and removed while they are shown look as if the world had been opened so") {
+  const Files files;
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  const LayerSpec low = layer_of(files.low, LayerGroup::height), high = layer_of(files.high, LayerGroup::height);
+  const LayerSpec red = layer_of(files.red, LayerGroup::color), green = layer_of(files.green, LayerGroup::color);
+  LayerSpec blue = layer_of(files.blue, LayerGroup::overlay);
+  LayerSpec catalogue = layer_of(files.blue, LayerGroup::color);
+  catalogue.source.type = "catalogue";
+  catalogue.source.path.clear();
+  catalogue.source.catalogue.files = {files.blue.path()};
+
+  const auto picture_of = [&](const std::vector<LayerSpec>& layers) {
+    World world;
+    world.layers = layers;
+    return Show(**thread, world, 0).finished_picture();
+  };
+  World world;
+  world.layers = {low, red};
+  Show first(**thread, world, 0), second(**thread, world, 2);
+  auto last = first.finished_picture();
+  CHECK((second.finished_picture() == last));
+  const auto changes_to = [&](const std::vector<LayerSpec>& layers, const std::string& what, const std::function<void(Globe&)>& change) {
+    CAPTURE(what);
+    const auto expected = picture_of(layers);
+    CHECK((expected != last));
+    for (Show* shown : {&first, &second}) {
+      change(*shown->globe);
+      CHECK((shown->picture_after_frames() == expected));
+    }
+    last = expected;
+  };
+  const auto add = [](const LayerSpec& spec, std::size_t number) {
+    return [&spec, number](Globe& globe) { CHECK(globe.add_layer(spec).value() == number); };
+  };
+  const auto remove = [](std::size_t number) {
+    return [number](Globe& globe) { CHECK(globe.remove_layer(number).has_value()); };
+  };
+  changes_to({low, red, green}, "a picture more", add(green, 2));
+  changes_to({low, high, red, green}, "heights more", add(high, 3));
+  changes_to({low, high, green}, "a picture less", remove(1));
+  changes_to({high, green}, "heights less", remove(0));
+  changes_to({high, green, red}, "the picture again", add(red, 4));
+  changes_to({high, green, red, catalogue}, "a catalogue more", add(catalogue, 5));
+  changes_to({high, green, red, catalogue, blue}, "the first overlay", add(blue, 6));
+  changes_to({high, green, red, blue}, "a catalogue less", remove(5));
+  CHECK(first.globe->layer_order() == std::vector<std::size_t>{3, 2, 4, 6});
+  CHECK(first.globe->layer_count() == 7);
+  changes_to({high, red, green, blue}, "their order", [](Globe& globe) { CHECK(globe.move_layer(2, true)); });
+  blue.opacity = 0.5;
+  changes_to({high, red, green, blue}, "settings of one that came later", [&](Globe& globe) { CHECK(globe.set_layer(6, blue).has_value()); });
+  changes_to({}, "all gone", [](Globe& globe) {
+    for (const std::size_t layer : globe.layer_order()) CHECK(globe.remove_layer(layer).has_value());
+  });
+}
+
+TEST_CASE("a picture that comes and goes has no tile made anew that it does not touch") {
+  const Files files;
+  MadeRaster antipodes = made(-165, GDT_Byte, {waves(0, 180, 60), waves(1, 80, 60), waves(2, 80, 60)});
+  (*antipodes.transform)[3] = -20;
+  const MadeFile far{"far.tif", antipodes};
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  Show show(**thread, world_of(files), 2);
+  const auto before = show.finished_picture();
+  const auto requests = show.view->stats().requests;
+  const std::size_t added = show.globe->add_layer(layer_of(far, LayerGroup::color)).value();
+  CHECK((show.finished_picture() == before));
+  CHECK(show.view->stats().requests == requests);
+  REQUIRE(show.globe->remove_layer(added).has_value());
+  CHECK((show.finished_picture() == before));
+  CHECK(show.view->stats().requests == requests);
+  REQUIRE(show.globe->add_layer(layer_of(files.blue, LayerGroup::color)).has_value());
+  CHECK((show.finished_picture() != before));
+  CHECK(show.view->stats().requests > requests);
+}
+
+TEST_CASE("a layer that comes, goes and changes before it is open leaves no trace") {
+  const Files files;
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  World world = world_of(files);
+  const auto before = Show(**thread, world, 0).finished_picture();
+  for (const int workers : {0, 2}) {
+    CAPTURE(workers);
+    Show show(**thread, world, workers);
+    for (int i = 0; i < 10; ++i) {
+      const std::size_t colours = show.globe->add_layer(layer_of(files.blue, LayerGroup::color)).value();
+      const std::size_t heights = show.globe->add_layer(layer_of(files.high, LayerGroup::height)).value();
+      if (i % 2 == 0) (void)show.view->update(show.camera, {}, 5.0);
+      CHECK(show.globe->move_layer(colours, false));
+      CHECK(show.globe->remove_layer(heights).has_value());
+      CHECK(show.globe->remove_layer(colours).has_value());
+    }
+    CHECK((show.finished_picture() == before));
+    CHECK(show.globe->layer_order().size() == world.layers.size());
+  }
+}
+
+TEST_CASE("tables of heights that were kept are found again by heights that come later") {
+  const Files files;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("tellurion-tables-{}", ::getpid());
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  World world = world_of(files);
+  world.layers[1].enabled = true;
+  const auto expected = Show(**thread, world, 0, folder).finished_picture();
+  world.layers.erase(world.layers.begin() + 1);
+  Show later(**thread, world, 0, folder);
+  (void)later.finished_picture();
+  REQUIRE(later.globe->add_layer(layer_of(files.high, LayerGroup::height)).has_value());
+  CHECK_FALSE(later.globe->catalogues_ready());
+  int jobs = 0;
+  while (later.globe->run_one()) ++jobs;
+  CHECK(jobs == 2);  // opens it, loads the table: nothing is scanned
+  CHECK(later.globe->tables_ready());
+  CHECK((later.finished_picture() == expected));
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("add_layer, remove_layer and add_data: what cannot be is said") {
+  const Files files;
+  for (const int workers : {0, 2}) {
+    CAPTURE(workers);
+    GlobeOptions options;
+    options.workers = workers;
+    auto globe = std::move(*Globe::open(world_of(files), options));
+    const auto wait = [&] { REQUIRE(globe->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience)); };
+    LayerSpec wrong = layer_of(files.red, LayerGroup::color);
+    wrong.opacity = 2.0;
+    CHECK(globe->add_layer(wrong).error().message == "layer \"" + files.red.path() + "\": `opacity` is 0 to 1, not 2");
+    CHECK(globe->layer_count() == 5);
+    CHECK(globe->remove_layer(5).error().code == ErrorCode::invalid_argument);
+    CHECK(globe->remove_layer(3).has_value());
+    CHECK(globe->remove_layer(3).error().code == ErrorCode::invalid_argument);
+    CHECK(globe->set_layer(3, {}).error().message == "layer 3 has been removed");
+    CHECK_FALSE(globe->move_layer(3, true));
+    CHECK_FALSE(globe->layer_settings(3).enabled);
+    CHECK(globe->raster_at(3, {}) == nullptr);
+
+    LayerSpec nowhere = layer_of(files.red, LayerGroup::color);
+    nowhere.source.path = "/nowhere/at/all.tif";
+    const std::size_t lost = globe->add_layer(nowhere).value();
+    wait();
+    CHECK(globe->source_stats()[lost].last_error.find("/nowhere/at/all.tif") != std::string::npos);
+    REQUIRE(globe->hints().size() == 1);
+    CHECK(globe->hints().front().find("/nowhere/at/all.tif") != std::string::npos);
+    CHECK(globe->data_missing());
+    CHECK(globe->remove_layer(lost).has_value());
+    CHECK(globe->hints().empty());
+    CHECK_FALSE(globe->data_missing());
+
+    nowhere.source.type = "catalogue";
+    const std::size_t list = globe->add_layer(nowhere).value();
+    wait();
+    CHECK(globe->insert(list, {files.red.path()}).error().code == ErrorCode::invalid_argument);
+    CHECK(globe->remove_layer(list).has_value());
+
+    std::vector<AddedData> added;
+    globe->add_data({files.red.path(), "/nowhere/at/all.tif", "world.toml", files.red.path(), files.high.path()}, [&](const std::vector<AddedData>& all) { added = all; });
+    wait();
+    REQUIRE(added.size() == 5);
+    REQUIRE(added[0].layer.has_value());
+    CHECK(globe->layer(added[0].layer.value()).spec.group == LayerGroup::color);
+    CHECK(globe->shown_raster(added[0].layer.value()) != nullptr);
+    CHECK(added[1].layer.error().message.find("/nowhere/at/all.tif") != std::string::npos);
+    CHECK(added[2].layer.error().message.find("world.toml: a world file") != std::string::npos);
+    const std::string name = globe->layer(added[0].layer.value()).spec.name;
+    CHECK(globe->layer(added[3].layer.value()).spec.name == name + " 2");
+    CHECK(globe->layer(added[4].layer.value()).spec.group == LayerGroup::height);
+    CHECK(globe->layer_order() == std::vector<std::size_t>{0, 1, added[4].layer.value(), 2, 4, added[0].layer.value(), added[3].layer.value()});
+    CHECK_FALSE(globe->data_missing());
+  }
+}
+
+TEST_CASE("add_data: what lies on another body is no layer of this one") {
+  const Files files;
+  World mars;
+  mars.planet = "Mars";
+  mars.ellipsoid = geo::kMars;
+  GlobeOptions options;
+  options.workers = 0;
+  auto globe = std::move(*Globe::open(mars, options));
+  std::string told;
+  globe->add_data({files.red.path()}, [&](const std::vector<AddedData>& all) { told = all.front().layer.error().message; });
+  REQUIRE(globe->wait_for_catalogues(std::chrono::steady_clock::now() + kPatience));
+  CHECK(told.ends_with("lies on Earth, but this is a world of Mars"));
+  CHECK(globe->layer_order().empty());
+}
+
 TEST_CASE("save_layers: settings and order come into the world's file, which else stays as it is, or into a new one") {
   const Files files;
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("tellurion-layers-{}", ::getpid());
@@ -221,6 +385,58 @@ TEST_CASE("save_layers: settings and order come into the world's file, which els
   REQUIRE(made.has_value());
   CHECK(*made == folder / "world.toml");
   CHECK(load_world(*made)->layers[2].source.path == files.green.path());
-  CHECK(*save_layers(*other, folder) == folder / "world-2.toml");
+  REQUIRE(other->move_layer(1, false));
+  CHECK(*save_layers(*other, folder) == folder / "world.toml");  // the same again
+  CHECK(load_world(*made)->layers[1].source.path == files.green.path());
+  CHECK_FALSE(std::filesystem::exists(folder / "world-2.toml"));
+  auto another = std::move(*Globe::open(of_no_file, options));
+  CHECK(*save_layers(*another, folder) == folder / "world-2.toml");
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("save_layers: layers that were added come into the world's file, and those that were removed go out of it") {
+  const Files files;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("tellurion-more-layers-{}", ::getpid());
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "mine.toml";
+  std::string text = "# Mine.\n";
+  for (const MadeFile* picture : {&files.red, &files.green}) text += fmt::format("\n# A picture.\n[[layer]]\ngroup = \"color\"\nsource = {{ path = \"{}\" }}\n", picture->path());
+  std::ofstream(file) << text;
+  GlobeOptions options;
+  options.workers = 0;
+  auto globe = std::move(*Globe::open(*load_world(file), options));
+  const auto saved = [&] {
+    const auto where = save_layers(*globe, folder);
+    REQUIRE_MESSAGE(where.has_value(), (where ? std::string() : where.error().message));
+    CHECK(*where == file);
+    std::vector<std::string> names;
+    const World now = *load_world(file);
+    for (const LayerSpec& layer : now.layers) names.push_back(std::filesystem::path(layer.name).stem().string());
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  LayerSpec blue = layer_of(files.blue, LayerGroup::color);
+  blue.opacity = 0.25;
+  const std::size_t added = globe->add_layer(blue).value();
+  const std::size_t heights = globe->add_layer(layer_of(files.low, LayerGroup::height)).value();
+  CHECK(saved() == Names{"red", "green", "low", "blue"});
+  CHECK(load_world(file)->layers[3].opacity == 0.25);
+  CHECK(saved() == Names{"red", "green", "low", "blue"});  // not once more
+  REQUIRE(globe->move_layer(added, false));
+  REQUIRE(globe->remove_layer(0).has_value());
+  CHECK(saved() == Names{"low", "blue", "green"});
+  REQUIRE(globe->remove_layer(added).has_value());
+  REQUIRE(globe->remove_layer(heights).has_value());
+  CHECK(saved() == Names{"green"});
+  std::ifstream stream(file);
+  CHECK(std::string(std::istreambuf_iterator<char>(stream), {}).starts_with("# Mine.\n\n# A picture.\n[[layer]]"));
+  // One that was never saved is not looked for, be there one like it; nor is one that somebody else has removed.
+  const std::size_t passing = globe->add_layer(blue).value();
+  std::ofstream(file, std::ios::app) << fmt::format("\n[[layer]]\nname = \"{0}\"\ngroup = \"color\"\nsource = {{ path = \"{0}\" }}\n", files.blue.path());
+  REQUIRE(globe->remove_layer(passing).has_value());
+  CHECK(saved() == Names{"green", "blue"});
+  std::ofstream(file) << "# Empty.\n";
+  REQUIRE(globe->remove_layer(1).has_value());
+  CHECK(saved().empty());
   std::filesystem::remove_all(folder);
 }

@@ -1,5 +1,7 @@
 #include "globe/surface_steps.h"
 
+#include <set>
+
 #include <doctest/doctest.h>
 
 #include "globe/slot_ages.h"
@@ -80,6 +82,41 @@ TEST_CASE("SurfaceSteps: a step that cannot be opened is left out and told of") 
   CHECK(made.steps.failures_of(0).count == 1);
   CHECK(made.steps.failures_of(0).last_error == "/data/2010.tif: there is no such file");
   CHECK(made.steps.at(utc("2021-01-01"))->colours.size() == 2);
+}
+
+TEST_CASE("SurfaceSteps: layers come over the others of their group and go, and the others keep their numbers") {
+  Steps made;
+  const auto before = made.steps.at(utc("2000-01-01"));
+  LayerSpec heights;
+  heights.group = LayerGroup::height;
+  CHECK(made.steps.add(heights) == 2);
+  CHECK(made.steps.held_at(utc("2000-01-01")) == before);  // it shows nothing yet
+  CHECK(made.steps.order() == std::vector<std::size_t>{2, 0, 1});
+  made.steps.set_source(2, made.steps.raster_at(1, {}));
+  const auto with_heights = made.steps.held_at(utc("2000-01-01"));
+  REQUIRE(with_heights->heights.size() == 1);
+
+  CHECK(made.steps.add(Steps::timed().spec) == 3);
+  CHECK(made.steps.held_at(utc("2000-01-01")) == nullptr);
+  const auto twice = made.steps.at(utc("2000-01-01"));
+  REQUIRE(twice->colours.size() == 3);
+  CHECK(made.opened == std::vector<std::string>{"/data/2000.tif", "/data/2000.tif"});
+  std::set<std::uint32_t> ids{twice->heights[0].source_id};
+  for (const surface::Layer& layer : twice->colours) ids.insert(layer.source_id);
+  CHECK(ids.size() == 4);
+  CHECK(twice->colours[0].source_id == before->colours[0].source_id);
+
+  made.steps.remove(0);
+  const auto without = made.steps.held_at(utc("2000-01-01"));
+  REQUIRE(without->colours.size() == 2);
+  CHECK(without->colours[1].source_id == twice->colours[2].source_id);
+  CHECK(made.steps.order() == std::vector<std::size_t>{2, 1, 3});
+  CHECK_FALSE(made.steps.settings(0).enabled);
+  made.steps.set_settings(0, {});
+  made.steps.set_source(0, made.steps.raster_at(1, {}));
+  CHECK(made.steps.at(utc("2000-01-01")) == without);
+  CHECK_FALSE(made.steps.move(0, true));
+  CHECK(made.steps.raster_at(0, utc("2000-01-01")) == nullptr);
 }
 
 TEST_CASE("SlotAges: slots that a changed layer touches are composed anew, once, as long as they are shown") {

@@ -270,7 +270,7 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
       const geo::TileKey key = geo::tile_at(geo::normal_at(at(lat, lon)), level);
       CAPTURE(geo::to_string(key));
       const TileImagery imagery = pictures.of(key);
-      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger; beyond the border it fades over one of the
+      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger. Places are right to a third of a texel; beyond the border it fades over a pixel of the
       // source or a texel, which measures up to 1.7 times its nominal size in longitude.
       const double texel = to_degrees(geo::tile_angle(level)).value / 248;
       const double blur = std::max(0.02, texel) * 4;
@@ -284,7 +284,7 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
         if (within < -std::max(0.02, 2 * texel)) {
           REQUIRE(colour == glm::dvec4(0));
           ++outside;
-        } else if (within > 0 && from_void > 0.2 + blur) {
+        } else if (within > texel && from_void > 0.2 + blur) {
           REQUIRE(glm::distance(colour, glm::dvec4(200, 100, 50, 255)) < 1.01);
           ++inside;
         } else if (from_void < 0.18 - blur) {
