@@ -159,6 +159,21 @@ Metres GridCoverage::spacing_under(const geo::TileKey& tile) const {
   return Metres(finest);
 }
 
+namespace {
+
+/// Whether columns and rows at the middle of the upper edge turn as on a map with the south below; false where a raster is mirrored.
+bool is_upright(const PixelRange& range, const ToPlaces& to_places) {
+  const glm::dvec2 step = (range.upper - range.lower) * 1e-3;
+  const glm::dvec2 middle(0.5 * (range.lower.x + range.upper.x), range.lower.y);
+  const std::array<glm::dvec2, 3> pixels{middle, middle + glm::dvec2(step.x, 0.0), middle + glm::dvec2(0.0, step.y)};
+  std::array<geo::LatLon, 3> places;
+  to_places(pixels, places);
+  const glm::dvec3 here = geo::normal_at(places[0]).xyz;
+  return glm::dot(here, glm::cross(geo::normal_at(places[1]).xyz - here, geo::normal_at(places[2]).xyz - here)) < 0.0;
+}
+
+}  // namespace
+
 geo::GeodeticBounds bounds_of(const PixelRange& range, const ToPlaces& to_places) {
   constexpr int kStepsPerEdge = 256;
   const std::array<glm::dvec2, 5> corners{range.lower, glm::dvec2(range.upper.x, range.lower.y), range.upper,
@@ -194,7 +209,15 @@ geo::GeodeticBounds bounds_of(const PixelRange& range, const ToPlaces& to_places
     east = std::max(east, longitude);
   }
   const bool round_a_pole = complete && std::abs(longitude - outline.front().longitude.value) > kPi;
-  if (round_a_pole) (std::abs(north) > std::abs(south) ? north : south) = std::copysign(kPi / 2, north + south);
+  if (round_a_pole) {
+    // The outline goes with the clock, seen from above: round the north pole that is to the west.
+    const bool westward = longitude < outline.front().longitude.value;
+    if (westward == is_upright(range, to_places)) {
+      north = kPi / 2;
+    } else {
+      south = -kPi / 2;
+    }
+  }
   if (!complete || round_a_pole || east - west > 2.0 * kPi - 1e-9) return {Radians(south), Radians(north), Radians(-kPi), Radians(kPi)};
   const double turn = 2.0 * kPi * std::floor((west + kPi) / (2.0 * kPi));
   return {Radians(south), Radians(north), Radians(west - turn), Radians(east - turn)};

@@ -1,4 +1,5 @@
 """Other bodies and other projections: the guide's world files and commands, heights against the rasters' own samples."""
+# label: slow
 # timeout: 300
 import re
 import subprocess
@@ -174,6 +175,39 @@ class Heights(Bodies):
         done = self.tellurion("info", declared)
         self.assertRegex(done.stdout, r"heights +above EGM96 height")
         np.testing.assert_allclose(self.heights(declared, lat, lon), expected, atol=0.01)
+
+    def test_heights_above_a_sphere(self):
+        """At the poles the ellipsoid lies 19,990 m inside the sphere, at the equator on it; radii are such heights too."""
+        plain = self.world("above-ellipsoid", ("height", MOLA), planet="Mars")
+        sphere = self.world("above-sphere", ("height", MOLA, {"vertical": "sphere"}), planet="Mars")
+        lat, lon = [0.0, 45.0, 89.8], [20.0, 20.0, 20.0]
+        added = self.heights(sphere, lat, lon) - self.heights(plain, lat, lon)
+        print("a sphere over Mars:", added)
+        self.assertLess(abs(added[0]), 0.2)  # samples lie an eighth of a degree off the equator
+        self.assertTrue(9000 < added[1] < 11000)
+        self.assertAlmostEqual(added[2], 19990.0, delta=1.0)
+        radii = self.folder / "radii.tif"
+        gdal.Translate(str(radii), str(shared(MOLA)))
+        data = gdal.Open(str(radii), gdal.GA_Update)
+        data.GetRasterBand(1).SetOffset(3396190.0)
+        del data
+        world = self.folder / "radii.toml"
+        world.write_text(f'[planet]\nname = "Mars"\n[[layer]]\ngroup = "height"\nsource = {{ path = "{radii}" }}\n')
+        np.testing.assert_allclose(self.heights(world, lat, lon), self.heights(sphere, lat, lon), atol=0.01)
+
+    def test_declared_coordinate_systems(self):
+        """A raster without any; the planetocentric one of the ellipsoid, and one that counts to the west, which GeoTIFFs cannot hold."""
+        data = gdal.Open(str(shared(MOLA)))
+        for name, samples, system, lat in (("east", data.ReadAsArray(), "IAU_2015:49900", planetographic(17.375)), ("centric", data.ReadAsArray(), "IAU_2015:49902", planetographic(17.375)),
+                                           ("west", data.ReadAsArray()[:, ::-1], "IAU_2015:49901", 17.375)):
+            with self.subTest(name):
+                file = self.folder / f"{name}.tif"
+                made = gdal.GetDriverByName("GTiff").Create(str(file), 1440, 720, 1, gdal.GDT_Int16)
+                made.SetGeoTransform(data.GetGeoTransform())
+                made.GetRasterBand(1).WriteArray(samples)
+                del made
+                world = self.world(name, ("height", MOLA, {"path": str(file), "crs": system}), planet="Mars")
+                np.testing.assert_allclose(self.heights(world, [lat], [226.875]), 21134.0, atol=0.01)
 
     def test_a_raster_of_another_body_is_named_and_left_out(self):
         world = self.world("mixed", ("height", MOLA), ("color", "moon/moon_4k.jpg"), ("height", RAINIER), planet="Mars")

@@ -200,6 +200,35 @@ TEST_CASE("vertical: a compound CRS says its datum itself, and the options overr
   CHECK(heights_of(made, options).at(0, 0) == 100.0f);
 }
 
+TEST_CASE("vertical: heights above a sphere become those above the flattened ellipsoid, declared or because they are distances from the centre") {
+  MadeRaster made{.width = 36, .height = 18, .values = {std::vector<double>(648, 1000.0)}, .crs = "IAU_2015:49900", .transform = std::array<double, 6>{-180, 10, 0, 90, 0, -10}};
+  // A point at the planetocentric latitude of a row's middle and 3,397,190 m from the centre; Mars' radius there is that of the ellipse through it.
+  const auto expected = [](int row) {
+    const double centric = (85.0 - 10.0 * row) * std::numbers::pi / 180.0;
+    const double x = 3397190.0 * std::cos(centric), z = 3397190.0 * std::sin(centric);
+    return geo::to_geodetic(geo::kMars, {glm::dvec3(x, 0.0, z)}).height.value;
+  };
+  const auto check = [&](const raster::HeightGrid& grid) {
+    for (int row = 0; row < 18; ++row) CHECK(std::abs(grid.at(20, row) - expected(row)) < 0.5);  // up to 20 km along the normal leave the radius by 120 m, on ground that slopes by 0.6 %
+  };
+  GdalOptions options;
+  options.vertical = "sphere";
+  check(heights_of(made, options, geo::kMars));
+  options.vertical = "sphere 3396190";
+  check(heights_of(made, options, geo::kMars));
+  made.adjust = [](GDALDataset& d) { d.GetRasterBand(1)->SetOffset(3396190.0); };
+  check(heights_of(made, {}, geo::kMars));
+  const MadeFile file("radius.tif", made);
+  const auto source = open({.path = file.path()}, geo::kMars);
+  CHECK(source->description().vertical == "sphere 3396190");
+  CHECK(source->description().hints.empty());
+  options.vertical = "sphere 1737400";
+  options.path = file.path();
+  const auto wrong = open_gdal(options, geo::kMars);
+  REQUIRE(!wrong);
+  CHECK(wrong.error().message.find("sphere 3396190") != std::string::npos);
+}
+
 TEST_CASE("vertical: heights without a datum get a hint, heights with one and colours do not") {
   const MadeFile file("undeclared.tif", row_of({1, 2}, GDT_Int16));
   const auto undeclared = open({.path = file.path()});

@@ -2,7 +2,10 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <string>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -22,8 +25,11 @@ struct Opened {
   std::unique_ptr<RasterSource> source;
   std::unique_ptr<RasterReader> reader;
 
-  Opened(const std::string& path, const geo::Ellipsoid& world) {
-    Result<std::unique_ptr<RasterSource>> opened = open_gdal({.path = path}, world);
+  Opened(const std::string& path, const geo::Ellipsoid& world, std::optional<std::string> crs = {}) {
+    GdalOptions options;
+    options.path = path;
+    options.crs = std::move(crs);
+    Result<std::unique_ptr<RasterSource>> opened = open_gdal(options, world);
     REQUIRE_MESSAGE(opened, opened.error().message);
     source = std::move(opened).value();
     reader = std::move(source->open_reader()).value();
@@ -180,6 +186,41 @@ TEST_CASE("Mars: rasters in the IAU's planetographic, planetocentric, spherical 
     const double centric = std::atan(std::tan(70.0 * kDegree) * (3376200.0 * 3376200.0) / (3396190.0 * 3396190.0));
     const double rho = 2 * 3396190.0 * std::tan((std::numbers::pi / 2 - centric) / 2) / 10000.0;
     CHECK(glm::distance(north.pixel(70.0, 33.0), glm::dvec2(180.0)) == doctest::Approx(rho).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("Mars: declared geographic CRSs with planetographic latitudes and west longitudes, and with planetocentric latitudes of the ellipsoid") {
+  // As Snyder 3-28 and the names of the CRSs have it: IAU_2015:49901 counts degrees to the west, IAU_2015:49902 to the east.
+  const double graphic = std::atan(std::tan(18.0 * kDegree) * (3396190.0 * 3396190.0) / (3376200.0 * 3376200.0)) / kDegree;
+  const MadeFile file("declared.tif", {.width = 360, .height = 180, .values = {test::ramp(64800)}, .crs = "", .transform = std::array<double, 6>{0, 1, 0, 90, 0, -1}});
+  Opened west(file.path(), geo::kMars, "IAU_2015:49901");
+  CHECK(west.about().wraps);
+  CHECK(west.pixel(18.0, 226.0).x == doctest::Approx(134.0));
+  CHECK(west.pixel(18.0, 226.0).y == doctest::Approx(72.0));
+  CHECK(west.place({134.0, 72.0}).x == doctest::Approx(18.0));
+  CHECK(turn(west.place({134.0, 72.0}).y - 226.0) == doctest::Approx(0.0).epsilon(1e-9));
+  Opened centric(file.path(), geo::kMars, "IAU_2015:49902");
+  CHECK(centric.about().wraps);
+  CHECK(centric.pixel(graphic, 226.0).x == doctest::Approx(226.0));
+  CHECK(centric.pixel(graphic, 226.0).y == doctest::Approx(72.0));
+  CHECK(centric.place({226.0, 72.0}).x == doctest::Approx(graphic));
+}
+
+TEST_CASE("bounds: a polar raster that reaches past the equator holds its own pole, not the other one") {
+  // Polar stereographic on a sphere: a corner 40,000 km from the pole in both axes lies at 90 - 2 atan(40e6 sqrt(2) / 2 R) degrees (Snyder 21-33).
+  const double farthest = 90.0 - 2.0 * std::atan(40e6 * std::sqrt(2.0) / (2.0 * 3396190.0)) / kDegree;
+  for (const double sign : {1.0, -1.0}) {
+    for (const double mirrored : {1.0, -1.0}) {
+      CAPTURE(sign);
+      CAPTURE(mirrored);
+      const MadeFile file("cap.tif", {.width = 80, .height = 80, .values = {test::ramp(6400)}, .crs = sign > 0 ? "IAU_2015:49930" : "IAU_2015:49935",
+                                      .transform = std::array<double, 6>{-40e6 * mirrored, 1e6 * mirrored, 0, 40e6, 0, -1e6}});
+      const geo::GeodeticBounds bounds = Opened(file.path(), geo::Ellipsoid{Metres(3396190.0), Metres(3396190.0)}).about().bounds;
+      const double own = sign > 0 ? bounds.north.value : bounds.south.value;
+      const double other = sign > 0 ? bounds.south.value : bounds.north.value;
+      CHECK(own == doctest::Approx(sign * std::numbers::pi / 2));
+      CHECK(other == doctest::Approx(sign * farthest * kDegree));
+    }
   }
 }
 

@@ -163,7 +163,8 @@ HeightPlan plan_heights(GDALRasterBand& band, const GdalOptions& options, const 
   plan.scale = options.scale.value_or(band.GetScale());
   plan.offset = options.offset.value_or(band.GetOffset());
   // Planetary grids may give distances from the body's centre.
-  if (std::abs(plan.offset * plan.unit - world.a()) < 0.02 * world.a()) plan.offset -= world.a() / plan.unit;
+  plan.from_centre = std::abs(plan.offset * plan.unit - world.a()) < 0.02 * world.a();
+  if (plan.from_centre) plan.offset -= world.a() / plan.unit;
   plan.limit_metres = height_limit(world);
   return plan;
 }

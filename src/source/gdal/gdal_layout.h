@@ -32,6 +32,7 @@ struct HeightPlan {
   double offset = 0.0;
   double unit = 1.0;
   double limit_metres = 0.0;  ///< what is higher or deeper is no data
+  bool from_centre = false;   ///< the raster's numbers are distances from the body's centre: heights are above the sphere of its equatorial radius
 };
 
 enum class ColourModel { grey, palette, rgb, cmyk };

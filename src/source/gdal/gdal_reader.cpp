@@ -46,7 +46,7 @@ Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalL
   if (!mapping) return mapping.error();
   std::optional<VerticalDatum> datum;
   if (!layout->vertical.empty()) {
-    Result<VerticalDatum> made = VerticalDatum::create(layout->vertical);
+    Result<VerticalDatum> made = VerticalDatum::create(layout->vertical, layout->world);
     if (!made) return made.error();
     datum = std::move(made).value();
   }

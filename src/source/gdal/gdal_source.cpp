@@ -18,6 +18,7 @@
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/remote_mount.h"
 #include "source/grid_coverage.h"
+#include "source/proj/projection.h"
 #include "source/proj/vertical_datum.h"
 
 namespace tellurion::source {
@@ -53,15 +54,22 @@ class GdalSource final : public RasterSource {
 
 Error naming(const GdalOptions& options, const Error& error) { return {error.code, fmt::format("{}: {}", options.path, error.message)}; }
 
-/// Fills in which heights the samples are; a vertical CRS of the file counts unless the options say otherwise.
+/// What the file itself says that its heights are above; empty if nothing.
+std::string own_vertical(const GdalLayout& layout, const CrsFacts& facts) {
+  if (layout.heights.from_centre) return sphere_datum(layout.world.equatorial_radius);
+  return facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : layout.description.crs_wkt;
+}
+
+/// Fills in which heights the samples are; what the file says counts unless the options say otherwise.
 Result<void> choose_vertical(GdalLayout& layout, const CrsFacts& facts) {
   const GdalOptions& options = layout.options;
   RasterDescription& about = layout.description;
-  const std::string wanted = options.vertical.value_or(facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : about.crs_wkt);
+  std::string wanted = options.vertical.value_or(own_vertical(layout, facts));
+  if (wanted == kSphereDatum) wanted = sphere_datum(facts.ellipsoid.equatorial_radius);
   about.vertical = kEllipsoidDatum;
   about.vertical_declared = !wanted.empty();
   if (wanted == kEllipsoidDatum || about.kind != SampleKind::height) return {};
-  const bool on_earth = std::abs(layout.world.a() / geo::kWgs84.a() - 1.0) <= 0.01;
+  const bool on_earth = is_earth(layout.world);
   if (wanted.empty()) {
     about.hints.push_back(
         on_earth ? fmt::format("{} declares no vertical datum: its heights are taken as above the ellipsoid, which can be 100 m off; "
@@ -70,14 +78,11 @@ Result<void> choose_vertical(GdalLayout& layout, const CrsFacts& facts) {
                                "say vertical = \"ellipsoid\" in a world file.", options.path));
     return {};
   }
-  if (!on_earth) {
-    return {ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", wanted)};
-  }
-  Result<VerticalDatum> datum = VerticalDatum::create(wanted);
+  Result<VerticalDatum> datum = VerticalDatum::create(wanted, layout.world);
   if (!datum) return datum.error();
   if (std::abs(datum->slope()) != 1.0) layout.heights.unit = 1.0;  // the datum counts in the samples' unit already
   layout.vertical = wanted;
-  about.vertical = options.vertical.value_or(facts.vertical);
+  about.vertical = wanted == about.crs_wkt ? facts.vertical : wanted;
   return {};
 }
 

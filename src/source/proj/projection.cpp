@@ -93,17 +93,21 @@ std::string vertical_part(PJ_CONTEXT* context, const PJ* crs) {
 
 }  // namespace
 
+bool is_earth(const geo::Ellipsoid& world) { return same_radius(world.a(), geo::kWgs84.a()); }
+
 struct Projection::State {
   ProjContext context;
   PjPtr operation;  ///< from degrees (longitude, latitude) to coordinates; only with Method::proj
   Method method = Method::proj;
   CrsFacts facts;
+  bool north_first = false;  ///< `operation` gives the latitude before the longitude
   double latitude_factor = 1.0;  ///< tan(latitude in the world) / tan(latitude in the CRS)
   std::optional<double> period;
 
   Result<void> open(const std::string& crs_text, const geo::Ellipsoid& world, glm::dvec2 centre);
   Result<void> read_ellipsoid(const PJ* crs, const geo::Ellipsoid& world);
   Result<void> make_operation(const PJ* crs, bool on_earth, glm::dvec2 centre);
+  bool puts_north_first(const PJ* crs);
   void find_period();
 };
 
@@ -119,7 +123,7 @@ Result<void> Projection::State::open(const std::string& crs_text, const geo::Ell
   facts.vertical = vertical_part(ctx, whole.get());
   if (Result<void> read = read_ellipsoid(crs.get(), world); !read) return read;
 
-  const bool on_earth = same_radius(world.a(), geo::kWgs84.a());
+  const bool on_earth = is_earth(world);
   if (!on_earth) {
     const auto squeeze = [](const geo::Ellipsoid& e) { return (e.b() / e.a()) * (e.b() / e.a()); };
     latitude_factor = squeeze(facts.ellipsoid) / squeeze(world);
@@ -150,7 +154,7 @@ Result<void> Projection::State::read_ellipsoid(const PJ* crs, const geo::Ellipso
   }
   facts.ellipsoid = geo::Ellipsoid{Metres(a), Metres(b)};
   if (!same_radius(a, world.a())) {
-    return {ErrorCode::invalid_argument, fmt::format("its CRS \"{}\" is of {}, the world is {}", facts.name, body_of(a), body_of(world.a()))};
+    return {ErrorCode::invalid_argument, fmt::format("its CRS \"{}\" is of {}, the world is {}; name the right planet in the world file, or say which CRS is right: crs = \"...\"", facts.name, body_of(a), body_of(world.a()))};
   }
   return {};
 }
@@ -164,16 +168,27 @@ Result<void> Projection::State::make_operation(const PJ* crs, bool on_earth, glm
     return {ErrorCode::unsupported, fmt::format("PROJ finds no way from its CRS \"{}\" to latitude and longitude: {}", facts.name,
                                                 context.last_message())};
   }
+  north_first = puts_north_first(crs);
+  if (north_first) std::swap(centre.x, centre.y);
   proj_trans(operation.get(), PJ_INV, proj_coord(centre.x, centre.y, 0.0, HUGE_VAL));
   if (PjPtr best{proj_trans_get_last_used_operation(operation.get())}) operation = std::move(best);
   return {};
+}
+
+/// PROJ brings latitude and longitude into the order of a picture, but not where longitudes count to the west or latitudes are
+/// planetocentric ones of an ellipsoid.
+bool Projection::State::puts_north_first(const PJ* crs) {
+  if (proj_get_type(crs) == PJ_TYPE_PROJECTED_CRS) return false;
+  const PJ_COORD here = proj_trans(operation.get(), PJ_FWD, proj_coord(10.0, 20.0, 0.0, HUGE_VAL));
+  const PJ_COORD north = proj_trans(operation.get(), PJ_FWD, proj_coord(10.0, 21.0, 0.0, HUGE_VAL));
+  return std::abs(north.xy.x - here.xy.x) > std::abs(north.xy.y - here.xy.y);
 }
 
 /// Cylindrical: x is linear in longitude and does not know the latitude, y the other way round.
 void Projection::State::find_period() {
   const auto project = [&](double lon, double lat) {
     const PJ_COORD c = proj_trans(operation.get(), PJ_FWD, proj_coord(lon, lat, 0.0, HUGE_VAL));
-    return glm::dvec2(c.xy.x, c.xy.y);
+    return north_first ? glm::dvec2(c.xy.y, c.xy.x) : glm::dvec2(c.xy.x, c.xy.y);
   };
   // Three places within the half circle round the projection's own meridian, wherever that is.
   for (const double lon : {0.0, 90.0}) {
@@ -183,9 +198,9 @@ void Projection::State::find_period() {
     const glm::dvec2 north = project(lon + 7.0, 40.0);
     const double step = (east.x - origin.x) / 7.0;
     const double tolerance = std::abs(step) * 1e-9;
-    if (step > 0.0 && std::abs(far_east.x - origin.x - 21.0 * step) < tolerance && std::abs(north.x - east.x) < tolerance &&
+    if (std::abs(step) > 0.0 && std::abs(far_east.x - origin.x - 21.0 * step) < tolerance && std::abs(north.x - east.x) < tolerance &&
         std::abs(far_east.y - origin.y) < tolerance) {
-      period = 360.0 * step;
+      period = 360.0 * std::abs(step);
       return;
     }
   }
@@ -232,6 +247,9 @@ void Projection::to_places(std::span<const glm::dvec2> coordinates, std::span<ge
     return;
   }
   std::vector<glm::dvec2> degrees(coordinates.begin(), coordinates.end());
+  if (state_->north_first) {
+    for (glm::dvec2& c : degrees) std::swap(c.x, c.y);
+  }
   if (!degrees.empty()) {
     proj_trans_generic(state_->operation.get(), PJ_INV, &degrees[0].x, sizeof(glm::dvec2), degrees.size(), &degrees[0].y,
                        sizeof(glm::dvec2), degrees.size(), nullptr, 0, 0, nullptr, 0, 0);
@@ -262,6 +280,7 @@ void Projection::to_coordinates(std::span<const geo::LatLon> places, std::span<g
                      sizeof(glm::dvec2), coordinates.size(), nullptr, 0, 0, nullptr, 0, 0);
   for (glm::dvec2& c : coordinates) {
     if (!std::isfinite(c.x) || !std::isfinite(c.y)) c = {kNaN, kNaN};
+    if (state_->north_first) std::swap(c.x, c.y);
   }
 }
 

@@ -25,6 +25,9 @@ struct CrsFacts {
 /// The geographic CRS of a world, east first, as `Projection::create` takes it: longitudes and latitudes by the world's own radii.
 std::string geographic_crs(const geo::Ellipsoid& world);
 
+/// Whether the world is the Earth: some projections and vertical datums are the Earth's only.
+bool is_earth(const geo::Ellipsoid& world);
+
 class Projection {
  public:
   /// `crs` is anything that PROJ understands (WKT, "EPSG:3857", ...). `centre`: coordinates in the raster's middle; where
@@ -45,7 +48,7 @@ class Projection {
   void to_places(std::span<const glm::dvec2> coordinates, std::span<geo::LatLon> places);
   void to_coordinates(std::span<const geo::LatLon> places, std::span<glm::dvec2> coordinates);
 
-  /// In a cylindrical CRS, by how much the first coordinate grows round the body.
+  /// In a cylindrical CRS, by how much the first coordinate grows (or falls, where it counts to the west) round the body.
   std::optional<double> period() const;
 
  private:

@@ -5,12 +5,17 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
+#include "base/number.h"
 #include "source/proj/proj_context.h"
+#include "source/proj/projection.h"
 
 namespace tellurion::source {
 namespace {
@@ -21,6 +26,17 @@ struct ListDelete {
 struct FactoryDelete {
   void operator()(PJ_OPERATION_FACTORY_CONTEXT* factory) const { proj_operation_factory_context_destroy(factory); }
 };
+
+constexpr double kSameBody = 0.05;  ///< a sphere whose radius differs by more is none of the body's
+
+/// How far along its normal the ellipsoid's surface is from a sphere round the centre.
+double height_of_sphere(const geo::Ellipsoid& world, double radius, const geo::LatLon& place) {
+  const geo::Vector<geo::Ecef> normal = geo::normal_at(place);
+  const glm::dvec3 point = geo::surface_point(world, normal).xyz;
+  const double along = glm::dot(point, normal.xyz);
+  const double aside = glm::dot(point, point) - along * along;
+  return std::sqrt(radius * radius - aside) - along;
+}
 
 std::string code_of(const std::string& definition) {
   struct Alias {
@@ -65,7 +81,9 @@ double slope_of(PJ_CONTEXT* context, const PJ* vertical) {
 
 struct VerticalDatum::State {
   ProjContext context;
-  PjPtr operation;  ///< (longitude, latitude, height) in degrees and the datum's unit -> the same above the ellipsoid
+  PjPtr operation;  ///< (longitude, latitude, height) in degrees and the datum's unit -> the same above the ellipsoid; not of spheres
+  std::optional<double> sphere;  ///< radius
+  geo::Ellipsoid world;
   std::string name;
   double slope = 1.0;
   std::vector<std::array<double, 3>> room;
@@ -76,8 +94,23 @@ VerticalDatum::VerticalDatum(VerticalDatum&&) noexcept = default;
 VerticalDatum& VerticalDatum::operator=(VerticalDatum&&) noexcept = default;
 VerticalDatum::~VerticalDatum() = default;
 
-Result<VerticalDatum> VerticalDatum::create(const std::string& definition) {
+std::string sphere_datum(Metres radius) { return fmt::format("{} {}", kSphereDatum, radius.value); }
+
+Result<VerticalDatum> VerticalDatum::create(const std::string& definition, const geo::Ellipsoid& world) {
   auto state = std::make_unique<State>();
+  if (const std::string begin = fmt::format("{} ", kSphereDatum); definition.starts_with(begin)) {
+    state->sphere = parse_number(std::string_view(definition).substr(begin.size()));
+    if (!state->sphere || !(std::abs(*state->sphere / world.a() - 1.0) < kSameBody)) {
+      return Error{ErrorCode::invalid_argument, fmt::format("\"{}\" is no sphere of this body, whose radius is {:.0f} m: say \"sphere {:.0f}\", or \"sphere\" for that of the "
+                                                            "raster's own coordinate system", definition, world.a(), world.a())};
+    }
+    state->name = definition;
+    state->world = world;
+    return VerticalDatum(std::move(state));
+  }
+  if (!is_earth(world)) {
+    return Error{ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here \"ellipsoid\", \"sphere\" and \"sphere RADIUS\" can be", definition)};
+  }
   PJ_CONTEXT* const ctx = state->context.get();
   PjPtr vertical(proj_create(ctx, code_of(definition).c_str()));
   if (vertical && proj_get_type(vertical.get()) == PJ_TYPE_COMPOUND_CRS) vertical.reset(proj_crs_get_sub_crs(ctx, vertical.get(), 1));
@@ -110,6 +143,10 @@ double VerticalDatum::slope() const { return state_->slope; }
 
 void VerticalDatum::undulations(std::span<const geo::LatLon> places, std::span<double> metres) {
   assert(places.size() == metres.size());
+  if (state_->sphere) {
+    for (std::size_t i = 0; i < places.size(); ++i) metres[i] = height_of_sphere(state_->world, *state_->sphere, places[i]);
+    return;
+  }
   constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
   std::vector<std::array<double, 3>>& c = state_->room;
   c.clear();

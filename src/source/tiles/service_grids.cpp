@@ -1,4 +1,5 @@
 #include "source/tiles/service_grids.h"
+#include "source/proj/projection.h"
 
 #include <algorithm>
 #include <cmath>

@@ -28,7 +28,6 @@ Result<TileGrid> halving_grid(std::string crs, int columns, glm::dvec2 corner, d
 
 }  // namespace
 
-bool is_earth(const geo::Ellipsoid& world) { return std::abs(world.a() / geo::kWgs84.a() - 1.0) <= 0.01; }
 
 Result<TileGrid> web_mercator_grid(int tile_size, int min_zoom, int max_zoom) {
   const double half = std::numbers::pi * geo::kWgs84.a();

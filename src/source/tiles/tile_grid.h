@@ -38,9 +38,6 @@ Result<TileGrid> web_mercator_grid(int tile_size, int min_zoom, int max_zoom);
 /// Longitude and latitude of `world`, two tiles side by side at level 0. Errors likewise.
 Result<TileGrid> geographic_grid(int tile_size, int min_zoom, int max_zoom, const geo::Ellipsoid& world);
 
-/// Whether the world is the Earth: some projections and vertical datums are the Earth's only.
-bool is_earth(const geo::Ellipsoid& world);
-
 /// How pixels of one level lie in another: pixel of `to` = pixel of `from` * scale + offset.
 struct LevelTransform {
   glm::dvec2 scale{1.0};

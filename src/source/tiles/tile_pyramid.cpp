@@ -43,7 +43,7 @@ class PyramidSource final : public RasterSource {
     if (!mapping) return mapping.error();
     std::optional<VerticalDatum> datum;
     if (!layout_->vertical.empty()) {
-      Result<VerticalDatum> made = VerticalDatum::create(layout_->vertical);
+      Result<VerticalDatum> made = VerticalDatum::create(layout_->vertical, layout_->world);
       if (!made) return made.error();
       datum = std::move(*made);
     }
@@ -115,8 +115,9 @@ Result<PixelRange> range_of(const std::array<double, 4>& bounds, glm::dvec2 size
 
 /// Of heights: what they are above. Returns what VerticalDatum::create takes; nothing for the ellipsoid.
 /// A vertical part of the CRS counts unless `vertical` says otherwise.
-Result<std::string> find_datum(const std::optional<std::string>& vertical, const CrsFacts& facts, bool on_earth, RasterDescription& about) {
-  const std::string wanted = vertical.value_or(facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : about.crs_wkt);
+Result<std::string> find_datum(const std::optional<std::string>& vertical, const CrsFacts& facts, const geo::Ellipsoid& world, RasterDescription& about) {
+  std::string wanted = vertical.value_or(facts.vertical.empty() || facts.vertical == kEllipsoidDatum ? facts.vertical : about.crs_wkt);
+  if (wanted == kSphereDatum) wanted = sphere_datum(facts.ellipsoid.equatorial_radius);
   about.vertical = kEllipsoidDatum;
   about.vertical_declared = !wanted.empty();
   if (wanted == kEllipsoidDatum || about.kind != SampleKind::height) return std::string();
@@ -125,9 +126,8 @@ Result<std::string> find_datum(const std::optional<std::string>& vertical, const
                                       "say vertical = \"ellipsoid\", \"egm96\" or another in the world file.", about.name));
     return std::string();
   }
-  if (!on_earth) return Error{ErrorCode::invalid_argument, fmt::format("vertical = \"{}\" is a datum of the Earth; here only \"ellipsoid\" can be", wanted)};
-  if (const Result<VerticalDatum> datum = VerticalDatum::create(wanted); !datum) return datum.error();
-  about.vertical = vertical.value_or(facts.vertical);
+  if (const Result<VerticalDatum> datum = VerticalDatum::create(wanted, world); !datum) return datum.error();
+  about.vertical = wanted == about.crs_wkt ? facts.vertical : wanted;
   return wanted;
 }
 
@@ -179,7 +179,7 @@ Result<std::unique_ptr<RasterSource>> open_pyramid(TilePyramid pyramid, const ge
   about.crs_name = mapping->facts().name;
   about.crs_wkt = grid.crs;
   about.ellipsoid = mapping->facts().ellipsoid;
-  Result<std::string> datum = find_datum(pyramid.vertical, mapping->facts(), is_earth(world), about);
+  Result<std::string> datum = find_datum(pyramid.vertical, mapping->facts(), world, about);
   if (!datum) return naming(datum.error());
   layout->vertical = std::move(*datum);
 
