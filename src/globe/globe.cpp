@@ -19,6 +19,7 @@
 #include "globe/height_tables.h"
 #include "globe/kept_files.h"
 #include "globe/layer_catalogue.h"
+#include "globe/resident_heights.h"
 #include "globe/surface_steps.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
@@ -187,9 +188,13 @@ struct Globe::State {
   int opening = 0;                     ///< jobs in which workers open layers
   std::shared_ptr<HeightTables> tables;
 
+  ResidentHeights resident{[this](std::function<void(SurfaceWorker&)> work) { return submit(std::move(work)); }};
   std::vector<std::unique_ptr<SurfaceWorker>> workers;
   std::unique_ptr<WorkerPool> pool;  ///< last: its threads end before what they use
 
+  bool submit(std::function<void(SurfaceWorker&)> work) {
+    return pool->try_submit([this, work = std::move(work)](int worker) { work(*workers[static_cast<std::size_t>(worker)]); });
+  }
   std::shared_ptr<fetch::ByteStore> needed_store();
   Result<std::unique_ptr<source::RasterSource>> open_source(const LayerSpec& spec);
   Result<std::shared_ptr<const source::RasterSource>> open_raster(const LayerSpec& spec);
@@ -759,7 +764,10 @@ Result<void> Globe::change_kept_layers(const std::function<Result<void>(KeptLaye
 
 bool Globe::tables_ready() const { return state_->current_tables()->ready(); }
 
-void Globe::begin_tables() { state_->current_tables()->begin_scan(); }
+void Globe::begin_tables() {
+  (void)resident_heights();
+  state_->current_tables()->begin_scan();
+}
 
 bool Globe::wait_for_tables(std::chrono::steady_clock::time_point deadline) {
   begin_tables();
@@ -794,10 +802,7 @@ std::shared_ptr<const surface::SurfaceFacts> Globe::facts_of(const std::shared_p
   return s.other_facts.back().second;
 }
 
-bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) {
-  State& s = *state_;
-  return s.pool->try_submit([&s, work = std::move(work)](int worker) { work(*s.workers[static_cast<std::size_t>(worker)]); });
-}
+bool Globe::try_submit(std::function<void(SurfaceWorker&)> work) { return state_->submit(std::move(work)); }
 
 bool Globe::try_submit_at(const std::optional<UtcTime>& time,
                           std::function<void(SurfaceWorker&, const std::shared_ptr<const surface::SurfaceDescription>&)> work) {
@@ -806,33 +811,6 @@ bool Globe::try_submit_at(const std::optional<UtcTime>& time,
 
 bool Globe::run_one() { return state_->pool->run_one(); }
 int Globe::worker_count() const { return state_->pool->worker_count(); }
-
-// --- Heights ---------------------------------------------------------------------------------------------------------
-
-struct HeightSampler::State {
-  surface::ElevationModel model;
-  double half_circumference = 0;
-};
-
-namespace {
-
-/// The answer once all that it rests on is there; every round asks for at least one file more, and each ends in time.
-template <class Ask>
-auto with_data(surface::ElevationModel& model, const Ask& ask) {
-  for (;;) {
-    auto answer = ask();
-    source::Awaited awaited;
-    if (!model.take_pending(awaited)) return answer;
-    for (const auto& arrival : awaited) arrival->wait({});
-    if (awaited.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // another reader has asked for it
-  }
-}
-
-}  // namespace
-
-HeightSampler::HeightSampler(std::unique_ptr<State> state) : state_(std::move(state)) {}
-HeightSampler::HeightSampler(HeightSampler&&) noexcept = default;
-HeightSampler::~HeightSampler() = default;
 
 bool Globe::wait_for_catalogues(std::chrono::steady_clock::time_point deadline) {
   while (!catalogues_ready()) {
@@ -843,22 +821,8 @@ bool Globe::wait_for_catalogues(std::chrono::steady_clock::time_point deadline) 
 }
 
 Result<HeightSampler> Globe::height_sampler() const {
-  auto model = surface::ElevationModel::open(surface(), state_->blocks);
-  if (!model) return model.error();
-  const double half_circumference = std::numbers::pi * ellipsoid().a();
-  return HeightSampler(std::make_unique<HeightSampler::State>(HeightSampler::State{std::move(*model), half_circumference}));
+  return HeightSampler::open(*this, state_->blocks, [s = state_.get()](std::function<void(SurfaceWorker&)> work) { return s->submit(std::move(work)); });
 }
-
-Result<HeightSampler::Answer> HeightSampler::height_at(const geo::LatLon& place, HeightLookup lookup, Metres wanted_spacing) {
-  const auto how = lookup == HeightLookup::nearest ? surface::Lookup::nearest : surface::Lookup::bilinear;
-  const auto found = with_data(state_->model, [&] { return state_->model.height_at(place, how, wanted_spacing.value); });
-  if (!found) return found.error();
-  const bool known = std::isfinite(found->spacing);
-  return Answer{EllipsoidalHeight(found->metres), known ? std::log2(state_->half_circumference / found->spacing) : -1.0};
-}
-
-Result<geo::Vector<geo::Ecef>> HeightSampler::normal_at(const geo::LatLon& place, Metres wanted_spacing) {
-  return with_data(state_->model, [&] { return state_->model.surface_normal_at(place, wanted_spacing.value); });
-}
+std::shared_ptr<const surface::GlobalHeights> Globe::resident_heights() const { return state_->resident.of(surface()); }
 
 }  // namespace tellurion::globe

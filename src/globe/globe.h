@@ -26,6 +26,7 @@ class Catalogue;
 class RasterSource;
 }
 namespace tellurion::surface {
+class GlobalHeights;
 struct SurfaceDescription;
 class SurfaceFacts;
 }
@@ -47,18 +48,27 @@ struct GlobeOptions {
 /// Where caches are kept unless told otherwise: $XDG_CACHE_HOME/tellurion or ~/.cache/tellurion; empty if neither is set.
 std::filesystem::path default_cache_folder();
 
+class Globe;
+
 enum class HeightLookup { nearest, bilinear };
 
-/// Heights out of the sources' own samples. Belongs to one thread; may read files.
+/// Heights out of the sources' own samples, as the globe's layers were when it was made. Belongs to one thread; the globe outlives it.
 class HeightSampler {
  public:
   struct Answer {
     EllipsoidalHeight height;
     double level = 0;       ///< log2(half circumference / sample spacing) of the data that answered; -1: no data here, height 0
   };
-  /// `wanted_spacing` in metres: the resolution to answer from; 0: the deepest.
+  struct AnswerNow : Answer {
+    bool is_final = false;  ///< that of height_at; else a worker fetches or reads what lacks
+  };
+  /// `wanted_spacing` in metres: the resolution to answer from; 0: the deepest. Reads files, waits for servers.
   Result<Answer> height_at(const geo::LatLon& place, HeightLookup lookup = HeightLookup::bilinear, Metres wanted_spacing = Metres(0));
-  /// Unit normal of the ground.
+  /// The same (bilinear) at once, from the finest samples in memory: at least a grid of the whole body, about 78 km on Earth, as soon as a
+  /// worker has made it. Ask again, there or nearby, for better ones. Reads and waits for nothing, but that the first call opens the
+  /// layers' files and rasters of a catalogue are opened when they are met. Without threads Globe::run_one does the work.
+  AnswerNow height_now(const geo::LatLon& place, Metres wanted_spacing = Metres(0));
+  /// Unit normal of the ground. Reads and waits as height_at.
   Result<geo::Vector<geo::Ecef>> normal_at(const geo::LatLon& place, Metres wanted_spacing = Metres(0));
 
   HeightSampler(HeightSampler&&) noexcept;
@@ -68,6 +78,8 @@ class HeightSampler {
   friend class Globe;
   struct State;
   explicit HeightSampler(std::unique_ptr<State> state);
+  using Submit = std::function<bool(std::function<void(SurfaceWorker&)>)>;
+  static Result<HeightSampler> open(const Globe& globe, cache::BlockCache& blocks, Submit submit);
   std::unique_ptr<State> state_;
 };
 
@@ -180,6 +192,8 @@ class Globe {
   bool wait_for_tables(std::chrono::steady_clock::time_point deadline);
 
   Result<HeightSampler> height_sampler() const;
+  /// Heights of the whole body, always in memory once a worker has made them (the first view sees to that); null before. Reads nothing.
+  std::shared_ptr<const surface::GlobalHeights> resident_heights() const;
 
   // For the views of this globe.
   std::shared_ptr<const surface::SurfaceDescription> surface() const;  ///< at GlobeOptions::time; its heights hold at all times, until a catalogue changes

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "globe/surface_worker.h"
+#include "surface/global_heights.h"
 
 namespace tellurion::globe {
 
@@ -38,7 +39,11 @@ std::optional<EllipsoidalHeight> GroundBelow::find(Globe& globe, const view::Cam
     });
     if (!submitted) answer->asked = false;
   }
-  if (!answer->known) return std::nullopt;
+  if (!answer->known) {
+    const auto global = globe.resident_heights();
+    if (!global) return std::nullopt;
+    return EllipsoidalHeight(global->at(geo::place_of(geo::to_geodetic(globe.ellipsoid(), camera.eye))));
+  }
   return EllipsoidalHeight(answer->metres);
 }
 

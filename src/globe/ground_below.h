@@ -13,7 +13,7 @@ class GroundBelow {
  public:
   GroundBelow();
 
-  /// As a worker of `globe` found it last; nothing before the first answer. Asks for the next one.
+  /// As a worker of `globe` found it last, before that as its resident heights have it; nothing before either. Asks for the next one.
   std::optional<EllipsoidalHeight> find(Globe& globe, const view::Camera& camera);
 
  private:
