@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "source/debug/drawn_source.h"
+#include "source/drawn_source.h"
 
 namespace tellurion::source {
 namespace {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "source/debug/block_letters.h"
-#include "source/debug/drawn_source.h"
+#include "source/drawn_source.h"
 
 namespace tellurion::source {
 namespace {

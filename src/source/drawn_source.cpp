@@ -1,4 +1,4 @@
-#include "source/debug/drawn_source.h"
+#include "source/drawn_source.h"
 
 #include <span>
 #include <utility>
