@@ -27,6 +27,7 @@ struct NameHash {
     h ^= (std::uint64_t{static_cast<std::uint32_t>(n.key.column)} << 32 | static_cast<std::uint32_t>(n.key.row)) *
          0x9e3779b97f4a7c15ull;
     h ^= h >> 32;
+    h += n.key.content;
     h *= 0xd6e8feb86659fd93ull;
     return static_cast<std::size_t>(h ^ (h >> 32));
   }

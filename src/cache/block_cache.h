@@ -17,12 +17,13 @@ namespace tellurion::cache {
 
 inline constexpr int kBlockSide = 256;  ///< samples; blocks at a level's right and lower border are smaller
 
-/// Names a block: which source (and its revision), which level, which column and row of blocks.
+/// Names a block: which source, which level, which column and row of blocks, of which of its contents.
 struct BlockKey {
   std::uint32_t source = 0;
   std::uint32_t level = 0;
   std::int32_t column = 0;
   std::int32_t row = 0;
+  std::uint32_t content = 0;  ///< counts up when the source is read anew
 
   friend bool operator==(const BlockKey&, const BlockKey&) = default;
 };

@@ -46,7 +46,7 @@ HeightSample interpolate(const std::array<float, 4>& samples, double tx, double 
 
 }  // namespace
 
-Result<CachedRaster> CachedRaster::open(const source::RasterSource& source, BlockCache& cache, std::uint32_t id) {
+Result<CachedRaster> CachedRaster::open(const source::RasterSource& source, BlockCache& cache, std::uint32_t id, std::uint32_t content) {
   Result<std::unique_ptr<source::RasterReader>> reader = source.open_reader();
   if (!reader) return reader.error();
   CachedRaster raster;
@@ -54,6 +54,7 @@ Result<CachedRaster> CachedRaster::open(const source::RasterSource& source, Bloc
   raster.reader_ = std::move(reader).value();
   raster.cache_ = &cache;
   raster.id_ = id;
+  raster.content_ = content;
   raster.held_.reserve(kHeldBlocks);
   return raster;
 }
@@ -71,7 +72,7 @@ Result<Frozen<raster::HeightGrid>> CachedRaster::resident(const BlockKey& key) c
 }
 
 Result<const raster::HeightGrid*> CachedRaster::height_block(int level, int column, int row) {
-  const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
+  const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row, content_};
   const auto found = std::find_if(held_.begin(), held_.end(), [&](const Held& held) { return held.key == key; });
   if (found != held_.end()) {
     std::rotate(held_.begin(), found, std::next(found));  // the most recently used first
@@ -193,7 +194,7 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
           return reader_->read_colours(
               level, {left, top, std::min(kBlockSide, size.width - left), std::min(kBlockSide, size.height - top)});
         };
-        const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row};
+        const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row, content_};
         Result<Frozen<raster::Image>> decoded = cache_->image(key, std::cref(decode));
         if (decoded) {
           block = std::move(decoded).value();

@@ -23,8 +23,8 @@ struct HeightSample {
 
 class CachedRaster {
  public:
-  /// `source` and `cache` outlive this. `id` is the source's number in the cache's keys.
-  static Result<CachedRaster> open(const source::RasterSource& source, BlockCache& cache, std::uint32_t id);
+  /// `source` and `cache` outlive this. `id` and `content` are those of the cache's keys.
+  static Result<CachedRaster> open(const source::RasterSource& source, BlockCache& cache, std::uint32_t id, std::uint32_t content = 0);
 
   const source::RasterDescription& description() const { return source_->description(); }
   source::RasterReader& reader() { return *reader_; }
@@ -66,6 +66,7 @@ class CachedRaster {
   std::unique_ptr<source::RasterReader> reader_;
   BlockCache* cache_ = nullptr;
   std::uint32_t id_ = 0;
+  std::uint32_t content_ = 0;
   struct Held {
     BlockKey key;
     Frozen<raster::HeightGrid> block;

@@ -13,6 +13,7 @@
 #include "globe/prefetch.h"
 #include "globe/world.h"
 #include "globe/world_edit.h"
+#include "source/drawn_source.h"
 #include "source/raster_source.h"
 #include "view/camera.h"
 #include "view/controllers.h"

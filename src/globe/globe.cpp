@@ -203,6 +203,7 @@ struct Globe::State {
   void submit_opening(std::function<void()> work);
   void open_later(std::size_t layer);
   Result<void> open_layer(std::size_t layer);
+  void note_opened(std::size_t layer, const Result<void>& opened);
   std::size_t append(const LayerSpec& spec, bool opened);
   Result<void> remove(std::size_t layer);
   Result<std::size_t> add_data(const std::string& data);
@@ -359,13 +360,15 @@ void Globe::State::open_later(std::size_t layer) {
     if (std::exchange(layers[layer].opened, true)) return;
   }
   submit_opening([this, layer] {
-    const Result<void> opened = open_layer(layer);
-    if (opened) return;
-    std::lock_guard lock(mutex);
-    OpenLayer& one = layers[layer];
-    one.stats.errors = 1;
-    one.stats.last_error = one.error = opened.error().message;
+    note_opened(layer, open_layer(layer));
   });
+}
+
+void Globe::State::note_opened(std::size_t layer, const Result<void>& opened) {
+  std::lock_guard lock(mutex);
+  OpenLayer& one = layers[layer];
+  one.stats.errors = opened ? 0 : 1;
+  one.stats.last_error = one.error = opened ? std::string() : opened.error().message;
 }
 
 /// Opens and shows it, unless it has been removed.
@@ -739,6 +742,28 @@ Result<std::size_t> Globe::add_layer(const LayerSpec& spec) {
 }
 
 Result<void> Globe::remove_layer(std::size_t layer) { return state_->remove(layer); }
+
+Result<void> Globe::refresh_layer(std::size_t layer) {
+  State& s = *state_;
+  {
+    std::lock_guard lock(s.mutex);
+    if (layer >= s.layers.size() || s.layers[layer].removed) return {ErrorCode::invalid_argument, fmt::format("there is no layer {} to refresh", layer)};
+    if (s.layers[layer].info.spec.source.type == "catalogue")
+      return {ErrorCode::invalid_argument, fmt::format("layer {} is a catalogue: insert its rasters again to have them read anew", layer)};
+    if (!s.layers[layer].opened) return {};  // is opened, and read, when it is switched on
+  }
+  const LayerSpec& spec = s.layer_at(layer).info.spec;
+  if (spec.source.time) {
+    s.steps->reopen_steps(layer);
+    s.show_changed();
+  } else if (spec.source.raster) {
+    s.steps->set_source(layer, spec.source.raster);
+    s.show_changed();
+  } else {
+    s.submit_opening([&s, layer] { s.note_opened(layer, s.open_layer(layer)); });
+  }
+  return {};
+}
 
 void Globe::add_data(std::vector<std::string> data, std::function<void(const std::vector<AddedData>&)> done) {
   state_->submit_opening([s = state_.get(), data = std::move(data), done = std::move(done)] {

@@ -159,6 +159,10 @@ class Globe {
   /// until then it shows nothing; if it fails, source_stats and hints tell why. Only the tiles that it touches are made anew.
   /// Paths are absolute. Errors: invalid_argument (settings out of their range).
   Result<std::size_t> add_layer(const LayerSpec& spec);
+  /// Reads a layer's data anew: its file, server or program may have others by now. Returns at once; what was shown is shown until tiles have
+  /// been made of them, and for good if it cannot be opened again: source_stats tells why. Replies of servers count as long as these said.
+  /// Of a catalogue insert() does that, for each raster. Errors: invalid_argument (no such layer, or a catalogue).
+  Result<void> refresh_layer(std::size_t layer);
   /// Takes one away. Errors: invalid_argument (there is none of this number any more).
   Result<void> remove_layer(std::size_t layer);
   /// Puts data on top as `tellurion world add` would: each a layer of what it looks like, a folder a catalogue. Returns at once; a worker

@@ -11,7 +11,7 @@ constexpr std::uint64_t kFramesWanted = 3;  ///< a slot out of sight for longer 
 using Layers = std::vector<surface::Layer>;
 
 bool shows_the_same(const surface::Layer& a, const surface::Layer& b) {
-  return a.source_id == b.source_id && a.source == b.source && !a.catalogue == !b.catalogue && a.opacity == b.opacity && a.gamma == b.gamma &&
+  return a.source_id == b.source_id && a.content == b.content && a.source == b.source && !a.catalogue == !b.catalogue && a.opacity == b.opacity && a.gamma == b.gamma &&
          a.multiplier == b.multiplier && a.adds == b.adds;
 }
 

@@ -174,6 +174,7 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::describe(const 
     layer.catalogue = one.catalogue;
     layer.name = one.spec.name;
     layer.source_id = one.timed ? one.timed->ids.at(steps[i]) : one.id;
+    layer.content = one.content;
     layer.opacity = static_cast<float>(one.settings.opacity);
     layer.gamma = static_cast<float>(one.settings.gamma);
     layer.multiplier = static_cast<float>(one.settings.multiplier);
@@ -215,8 +216,20 @@ void SurfaceSteps::set_catalogue(std::size_t layer, std::shared_ptr<const source
 
 void SurfaceSteps::set_source(std::size_t layer, std::shared_ptr<const source::RasterSource> source) {
   std::lock_guard lock(mutex_);
-  if (layers_[layer].removed) return;
-  layers_[layer].fixed = std::move(source);
+  OneLayer& one = layers_[layer];
+  if (one.removed) return;
+  if (one.fixed) ++one.content;
+  one.fixed = std::move(source);
+  describe_anew();
+}
+
+void SurfaceSteps::reopen_steps(std::size_t layer) {
+  std::lock_guard lock(mutex_);
+  OneLayer& one = layers_[layer];
+  if (one.removed || !one.timed) return;
+  ++one.content;
+  one.timed->open.clear();
+  one.timed->failures = {};
   describe_anew();
 }
 

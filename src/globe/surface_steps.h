@@ -44,8 +44,10 @@ class SurfaceSteps {
   void remove(std::size_t layer);
   /// A layer shows another catalogue.
   void set_catalogue(std::size_t layer, std::shared_ptr<const source::Catalogue> catalogue);
-  /// A layer without times that had no source has one.
+  /// A layer without times has this source. What was read of it before no longer counts, even of the same source.
   void set_source(std::size_t layer, std::shared_ptr<const source::RasterSource> source);
+  /// The steps of a layer with times are opened and read anew.
+  void reopen_steps(std::size_t layer);
   void set_settings(std::size_t layer, const LayerSettings& settings);
   /// A layer lies over (`up`), or under, the next one of its group. False if there is none.
   bool move(std::size_t layer, bool up);
@@ -85,6 +87,7 @@ class SurfaceSteps {
     std::optional<TimedLayer> timed;  ///< its times never change; the rest is guarded as what follows
     // Guarded by mutex_:
     std::uint32_t id = 0;             ///< number in the block cache; steps have their own
+    std::uint32_t content = 0;        ///< how often it has been read anew
     Source fixed;                     ///< null: it has times, or has not been opened
     std::shared_ptr<const source::Catalogue> catalogue;
     LayerSettings settings;

@@ -22,7 +22,7 @@ inline constexpr Ink kNoInk{0, 0, 0, 0};
 inline constexpr Ink kBlackInk{0, 0, 0, 255};
 inline constexpr Ink kWhiteInk{255, 255, 255, 255};
 
-/// What a drawing is. `draw` is called on many threads at a time and depends on its arguments alone.
+/// What a drawing is. `draw` is called on many threads at a time; what it gives for the same arguments changes only with the layer (Globe::refresh_layer).
 struct Drawing {
   std::string name;      ///< also its revision: two drawings of a name are the same
   Georeference georeference;          ///< of level 0

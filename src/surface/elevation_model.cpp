@@ -105,7 +105,7 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
       model.has_catalogue_ = true;
       continue;
     }
-    Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
+    Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id, layer.content);
     if (!raster) return raster.error();
     model.layers_.emplace(&layer, HeightLayer{layer.source, std::move(raster).value(), reach_of(layer.source->description()), {}, {}});
   }

@@ -30,6 +30,7 @@ struct Layer {
   std::shared_ptr<const source::RasterSource> source;
   std::shared_ptr<const source::Catalogue> catalogue{};  ///< instead of `source`
   std::uint32_t source_id = 0;   ///< number in the block cache's keys
+  std::uint32_t content = 0;     ///< likewise: counts up when the source is read anew
   bool enabled = true;
   float opacity = 1.0f;
   float gamma = 1.0f;

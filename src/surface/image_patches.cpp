@@ -288,7 +288,7 @@ Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> 
     if (!layer.enabled) continue;
     ColourLayer& opened = model.layers_.emplace_back(ColourLayer{&layer, before ? before->take_rasters(layer) : std::list<OpenRaster>{}});
     if (layer.catalogue || !opened.rasters.empty()) continue;
-    Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id);
+    Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id, layer.content);
     if (!raster) return raster.error();
     opened.rasters.push_back({layer.source_id, layer.source, std::move(raster).value()});
   }
@@ -298,7 +298,7 @@ Result<ColourModel> ColourModel::open(std::shared_ptr<const SurfaceDescription> 
 
 std::list<ColourModel::OpenRaster> ColourModel::take_rasters(const Layer& layer) {
   const auto same = std::ranges::find_if(layers_, [&](const ColourLayer& one) {
-    return one.settings->source_id == layer.source_id && one.settings->source == layer.source && !one.settings->catalogue == !layer.catalogue;
+    return one.settings->source_id == layer.source_id && one.settings->content == layer.content && one.settings->source == layer.source && !one.settings->catalogue == !layer.catalogue;
   });
   return same == layers_.end() ? std::list<OpenRaster>{} : std::exchange(same->rasters, {});
 }

@@ -1,6 +1,7 @@
 // Layers whose settings and order change while a view shows them: what is seen in the end is what a globe shows that was opened so.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -13,11 +14,13 @@
 
 #include <unistd.h>
 
+#include <cpl_conv.h>
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
 #include "globe/show.h"
 #include "globe/world_edit.h"
+#include "source/drawn_source.h"
 #include "source/made_raster.h"
 
 using namespace tellurion;
@@ -439,4 +442,55 @@ TEST_CASE("save_layers: layers that were added come into the world's file, and t
   REQUIRE(globe->remove_layer(1).has_value());
   CHECK(saved().empty());
   std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("refresh_layer: what a program draws, and a file that has changed, show as they are now") {
+  const Files files;
+  const std::filesystem::path file = std::filesystem::temp_directory_path() / fmt::format("tellurion-changing-{}.tif", ::getpid());
+  const auto copy = [&](const MadeFile& from) { REQUIRE(CPLCopyFile(file.c_str(), from.path().c_str()) == 0); };
+  copy(files.red);
+  const auto brightness = std::make_shared<std::atomic<int>>(200);
+  source::Drawing drawing;
+  drawing.name = "weather";
+  drawing.georeference = {"EPSG:4326", {16.0, 8.0 / 512, 0.0, 49.0, 0.0, -8.0 / 512}, 512, 512};
+  drawing.levels = source::halved_levels({512, 512});
+  drawing.draw = [brightness](int, const source::PixelWindow& window) {
+    raster::Image image{window.width, window.height, {}};
+    const auto grey = static_cast<std::uint8_t>(*brightness);
+    for (int i = 0; i < window.width * window.height; ++i) image.rgba.insert(image.rgba.end(), {grey, grey, 0, 255});
+    return image;
+  };
+  LayerSpec drawn;
+  drawn.name = "weather";
+  drawn.source.raster = std::move(*source::open_drawing(drawing, geo::kWgs84));
+  LayerSpec changing = layer_of(files.red, LayerGroup::color);
+  changing.source.path = file;
+  World world;
+  world.layers = {layer_of(files.low, LayerGroup::height), changing, drawn};
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  Show first(**thread, world, 0), second(**thread, world, 2);
+  auto last = first.finished_picture();
+  CHECK((second.finished_picture() == last));
+  const auto refreshed = [&](std::size_t layer) {
+    const auto expected = Show(**thread, world, 0).finished_picture();
+    CHECK((expected != last));
+    for (Show* shown : {&first, &second}) {
+      REQUIRE(shown->globe->refresh_layer(layer).has_value());
+      CHECK((shown->finished_picture() == expected));
+    }
+    last = expected;
+  };
+  for (const int next : {40, 120}) {
+    *brightness = next;
+    refreshed(2);
+  }
+  copy(files.green);
+  refreshed(1);
+  // One that cannot be opened any more is shown as it was.
+  std::filesystem::remove(file);
+  REQUIRE(first.globe->refresh_layer(1).has_value());
+  CHECK((first.finished_picture() == last));
+  CHECK(first.globe->source_stats()[1].errors == 1);
+  CHECK_FALSE(first.globe->refresh_layer(3).has_value());
 }
