@@ -362,8 +362,7 @@ void Viewer::say(const std::string& text, double seconds) {
   notice_until_ = seconds_now() + seconds;
 }
 
-// --- What workers do for the user
-// --------------------------------------------------------------------------------------
+// --- What workers do for the user ------------------------------------------------------------------------------------
 
 void Viewer::add(const Drop& drop) {
   globe_->add_data(drop.paths, [done = done_, globe = globe_.get()](const std::vector<globe::AddedData>& added) {
