@@ -18,6 +18,12 @@ EUROPE = (50, 10, 2500000, 0, -90)
 ARCTIC = (80, 30, 5000000, 0, -90)
 
 
+def means(picture):
+    """Of 3 x 3 pixels round each."""
+    height, width = picture.shape[:2]
+    return sum(picture[dy:height - 2 + dy, dx:width - 2 + dx] for dy in range(3) for dx in range(3)) / 9.0
+
+
 class Services(Case):
     @classmethod
     def setUpClass(cls):
@@ -42,8 +48,8 @@ class Services(Case):
         return self.references[view]
 
     def check_same(self, name, source, view, most, margin=3):
-        """But for `margin` pixels all round, the mean difference is at most `most`, and no shift by a pixel makes it smaller:
-        nothing is turned or moved."""
+        """But for `margin` pixels all round, the mean difference of means of 3 x 3 pixels is at most `most`, and no shift by a pixel makes
+        that of pixels smaller: nothing is turned or moved. (A service that resamples takes from the contrast of single pixels.)"""
         wanted = self.reference(view)
         found = read_picture(self.render(self.world_of(name, source), view, *PLAIN, name=name)).astype(float)
         inner = wanted[margin:-margin, margin:-margin]
@@ -54,8 +60,9 @@ class Services(Case):
             return np.mean(np.abs(found[margin + dy:margin + dy + height, margin + dx:margin + dx + width] - inner))
 
         shifts = {(dx, dy): difference(dx, dy) for dx in (-2, -1, 0, 1, 2) for dy in (-2, -1, 0, 1, 2)}
-        print(f"{name}: mean difference {shifts[0, 0]:.3f}, a pixel away at least {min(v for k, v in shifts.items() if k != (0, 0)):.3f}")
-        self.assertLess(shifts[0, 0], most, name)
+        apart = np.mean(np.abs(means(found[margin:-margin, margin:-margin]) - means(inner)))
+        print(f"{name}: mean difference {shifts[0, 0]:.3f}, of means {apart:.3f}, a pixel away at least {min(v for k, v in shifts.items() if k != (0, 0)):.3f}")
+        self.assertLess(apart, most, name)
         self.assertEqual(min(shifts, key=shifts.get), (0, 0), f"{name} lies beside where it should")
 
     # --- The same picture ----------------------------------------------------------------------------------------
@@ -63,17 +70,17 @@ class Services(Case):
     def test_wmts_by_templates(self):
         url = f"{self.base}/wmts/1.0.0/WMTSCapabilities.xml"
         self.check_same("wmts-rest", f'type = "wmts", url = "{url}", layer = "night"', GLOBE, 0.2)
-        self.check_same("wmts-rest-degrees", f'type = "wmts", url = "{url}", layer = "night", matrix_set = "geodetic"', GLOBE, 4)
-        self.check_same("wmts-rest-arctic", f'type = "wmts", url = "{url}", layer = "arctic"', ARCTIC, 4, 50)
+        self.check_same("wmts-rest-degrees", f'type = "wmts", url = "{url}", layer = "night", matrix_set = "geodetic"', GLOBE, 2)
+        self.check_same("wmts-rest-arctic", f'type = "wmts", url = "{url}", layer = "arctic"', ARCTIC, 2, 50)
 
     def test_wmts_by_parameters(self):
         self.check_same("wmts-kvp", f'type = "wmts", url = "{self.base}/service", layer = "night", style = "default"', GLOBE, 0.2)
-        self.check_same("wmts-kvp-degrees", f'type = "wmts", url = "{self.base}/service?", layer = "night", matrix_set = "geodetic"', EUROPE, 6)
+        self.check_same("wmts-kvp-degrees", f'type = "wmts", url = "{self.base}/service?", layer = "night", matrix_set = "geodetic"', EUROPE, 2)
 
     def test_wms_of_both_versions_in_degrees(self):
         for version in ("1.1.1", "1.3.0"):
-            self.check_same(f"wms-{version}-4326", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "EPSG:4326", max_level = 5', GLOBE, 4)
-        self.check_same("wms-crs84", f'type = "wms", url = "{self.base}/service", layers = "night84", crs = "CRS:84", max_level = 5', EUROPE, 6)
+            self.check_same(f"wms-{version}-4326", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "EPSG:4326", max_level = 5', GLOBE, 2)
+        self.check_same("wms-crs84", f'type = "wms", url = "{self.base}/service", layers = "night84", crs = "CRS:84", max_level = 5', EUROPE, 2)
 
     def test_wms_in_projections(self):
         self.check_same("wms", f'type = "wms", url = "{self.base}/service", layers = "night", max_level = 4', GLOBE, 0.2)
@@ -81,8 +88,8 @@ class Services(Case):
         for version in ("1.1.1", "1.3.0"):
             # EPSG:3035 has north before east.
             for crs in ("EPSG:25832", "EPSG:3035"):
-                self.check_same(f"wms-{version}-{crs[5:]}", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "{crs}", bounds = [-5, 40, 25, 60]', EUROPE, 6, 90)
-        self.check_same("wms-arctic", f'type = "wms", url = "{self.base}/service", layers = "arctic", crs = "EPSG:3995", bounds = [-180, 50, 180, 86]', ARCTIC, 4, 50)
+                self.check_same(f"wms-{version}-{crs[5:]}", f'type = "wms", url = "{self.base}/service", layers = "night", version = "{version}", crs = "{crs}", bounds = [-5, 40, 25, 60]', EUROPE, 4, 90)
+        self.check_same("wms-arctic", f'type = "wms", url = "{self.base}/service", layers = "arctic", crs = "EPSG:3995", bounds = [-180, 50, 180, 86]', ARCTIC, 2, 50)
 
     def test_tms_of_a_service_and_of_a_folder(self):
         self.check_same("tms", f'type = "tms", url = "{self.base}/tms/1.0.0/night/mercator"', GLOBE, 0.2)
