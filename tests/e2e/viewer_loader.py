@@ -52,11 +52,12 @@ class Loader(WindowTest):
             """How far to the left the credits reach."""
             with TileServer() as server:
                 viewer = self.open((30, 30, 40000000, 0, -90), "--no-atmosphere", world=self.world(server, more))
-                corner = self.whole_screen(viewer)[SIZE[1] - 36:SIZE[1] - 12, SIZE[0] * 3 // 5:]
+                right = self.whole_screen(viewer)[:, SIZE[0] * 3 // 5:].min(axis=-1) > 90  # letters are light
                 viewer.close()
-            # Letters are light; what else the line says ends to the left of this.
-            inside = np.argwhere((corner.min(axis=-1) > 90).any(axis=0))
-            return corner.shape[1] - inside.min()
+            # Above the status line where both do not fit into one; else beside it, and what it says ends to the left of this.
+            above, beside = right[SIZE[1] - 66:SIZE[1] - 42], right[SIZE[1] - 36:SIZE[1] - 12]
+            inside = np.argwhere((above if above.any() else beside).any(axis=0))
+            return right.shape[1] - inside.min()
 
         short = credits_width("")
         long = credits_width('attribution = "Night lights: NASA Earth Observatory"\n')
