@@ -2,36 +2,27 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
-#include <limits>
 #include <mutex>
-#include <numbers>
 #include <optional>
 #include <thread>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include "cache/block_cache.h"
 #include "globe/height_tables.h"
 #include "globe/kept_files.h"
 #include "globe/layer_catalogue.h"
+#include "globe/layer_source.h"
 #include "globe/resident_heights.h"
 #include "globe/surface_steps.h"
 #include "globe/surface_worker.h"
 #include "globe/worker_pool.h"
 #include "fetch/byte_store.h"
 #include "source/catalogue/catalogue.h"
-#include "source/debug/scale_reference.h"
-#include "source/debug/tile_index.h"
 #include "source/gdal/gdal_source.h"
-#include "source/tiles/cesium_terrain.h"
-#include "source/tiles/service_source.h"
-#include "source/tiles/tile_archive.h"
-#include "source/tiles/tiled_source.h"
 #include "surface/error_scan.h"
 #include "surface/surface_facts_made.h"
 
@@ -45,98 +36,7 @@ int default_worker_count() {
   return std::max(static_cast<int>(std::thread::hardware_concurrency()) - 1, 1);
 }
 
-source::SampleKind kind_of(LayerGroup group) {
-  if (group == LayerGroup::height) return source::SampleKind::height;
-  const bool is_grey = group == LayerGroup::grayscale || group == LayerGroup::grayscale_overlay || group == LayerGroup::water;
-  return is_grey ? source::SampleKind::grey : source::SampleKind::colour;
-}
-
 }  // namespace
-
-source::GdalOptions gdal_options(const LayerSpec& layer) {
-  source::GdalOptions options;
-  options.path = layer.source.path.string();
-  options.kind = kind_of(layer.group);
-  options.crs = layer.source.crs;
-  options.vertical = layer.source.vertical;
-  options.no_data = layer.source.no_data;
-  options.scale = layer.source.scale;
-  options.offset = layer.source.offset;
-  options.rgb_bands = layer.source.bands;
-  options.bounds = layer.source.bounds;
-  return options;
-}
-
-std::vector<std::string> header_lines(const SourceSpec& source) {
-  std::vector<std::string> lines;
-  for (const auto& [name, value] : source.headers) lines.push_back(name + ": " + value);
-  return lines;
-}
-
-source::CesiumTerrain cesium_terrain(const LayerSpec& layer) {
-  const SourceSpec& source = layer.source;
-  source::CesiumTerrain terrain;
-  terrain.url = source.url;
-  terrain.headers = header_lines(source);
-  terrain.tile_size = source.tile_size;
-  if (source.max_level != kEveryLevel) terrain.max_zoom = source.max_level;
-  terrain.vertical = source.vertical;
-  return terrain;
-}
-
-source::TileArchive tile_archive(const LayerSpec& layer) {
-  const SourceSpec& source = layer.source;
-  source::TileArchive archive;
-  archive.file = source.path;
-  archive.url = source.url;
-  archive.headers = header_lines(source);
-  archive.table = source.table;
-  archive.kind = kind_of(layer.group);
-  archive.encoding = source.encoding;
-  archive.bounds = source.bounds;
-  archive.vertical = source.vertical;
-  return archive;
-}
-
-source::TileService tile_service(const LayerSpec& layer) {
-  const SourceSpec& source = layer.source;
-  source::TileService service;
-  service.url = source.url;
-  service.subdomains = source.subdomains;
-  service.headers = header_lines(source);
-  service.scheme = source.projection == "geographic" ? source::TileScheme::geographic : source::TileScheme::web_mercator;
-  service.kind = kind_of(layer.group);
-  service.encoding = source.encoding;
-  service.tile_size = source.tile_size;
-  service.min_zoom = source.min_level;
-  service.max_zoom = source.max_level;
-  service.vertical = source.vertical;
-  service.bounds = source.bounds;
-  return service;
-}
-
-source::ServiceOptions service_options(const LayerSpec& layer) {
-  const SourceSpec& source = layer.source;
-  source::ServiceOptions options;
-  options.url = source.url;
-  options.headers = header_lines(source);
-  options.kind = kind_of(layer.group);
-  options.encoding = source.encoding;
-  options.layer = source.service.layer;
-  options.style = source.service.style;
-  options.matrix_set = source.service.matrix_set;
-  options.format = source.service.format;
-  options.dimensions = source.service.dimensions;
-  options.version = source.service.version;
-  options.crs = source.crs.value_or("");
-  options.transparent = source.service.transparent;
-  options.tile_size = source.tile_size;
-  options.least_level = source.service.min_level;
-  options.most_level = source.service.max_level;
-  options.bounds = source.bounds;
-  options.vertical = source.vertical;
-  return options;
-}
 
 std::filesystem::path default_cache_folder() {
   if (const char* set = std::getenv("XDG_CACHE_HOME"); set && *set) return std::filesystem::path(set) / "tellurion";
@@ -231,28 +131,7 @@ std::shared_ptr<fetch::ByteStore> Globe::State::needed_store() {
 }
 
 Result<std::unique_ptr<source::RasterSource>> Globe::State::open_source(const LayerSpec& spec) {
-  const std::string& type = spec.source.type;
-  if (type == "xyz") return source::open_tiles(tile_service(spec), world.ellipsoid, needed_store());
-  if (type == "cesium-terrain") {
-    if (spec.group != LayerGroup::height)
-      return Error{ErrorCode::invalid_argument, fmt::format("{}: holds heights: its layer's group is \"height\"", fetch::public_part(spec.source.url))};
-    return source::open_cesium_terrain(cesium_terrain(spec), world.ellipsoid, needed_store());
-  }
-  if (type == "wmts") return source::open_wmts(service_options(spec), world.ellipsoid, needed_store());
-  if (type == "wms") return source::open_wms(service_options(spec), world.ellipsoid, needed_store());
-  if (type == "tms") return source::open_tms(service_options(spec), world.ellipsoid, needed_store());
-  if (type == "mbtiles") return source::open_mbtiles(tile_archive(spec), world.ellipsoid);
-  if (type == "geopackage") return source::open_geopackage(tile_archive(spec), world.ellipsoid);
-  if (type == "pmtiles") return source::open_pmtiles(tile_archive(spec), world.ellipsoid, spec.source.url.empty() ? nullptr : needed_store());
-  if (spec.source.type == "tile-index") return source::open_tile_index({spec.source.projection == "geographic", spec.source.tile_size}, world.ellipsoid);
-  if (spec.source.type == "scale") return source::open_scale_reference(spec.source.unit == "m" ? source::ScaleUnit::metres : source::ScaleUnit::kilometres, world.ellipsoid);
-  source::GdalOptions how = gdal_options(spec);
-  if (type == "cog") {
-    how.path = spec.source.url;
-    return source::open_cog(how, header_lines(spec.source), world.ellipsoid, needed_store());
-  }
-  if (!options.cache_folder.empty()) how.unpack_folder = (options.cache_folder / "unpacked").string();
-  return source::open_gdal(how, world.ellipsoid);
+  return open_layer_source(spec, world.ellipsoid, options.cache_folder, [this] { return needed_store(); });
 }
 
 /// What a layer without times shows.
@@ -589,77 +468,6 @@ std::size_t Globe::memory_cache_bytes() const { return state_->blocks.bytes() + 
 std::size_t Globe::disk_cache_bytes() const { return state_->store ? state_->store->disk_bytes() : 0; }
 fetch::FetchStats Globe::fetch_stats() const { return state_->store ? state_->store->stats() : fetch::FetchStats{}; }
 std::size_t Globe::memory_budget_bytes() const { return state_->options.memory_cache_bytes; }
-
-namespace {
-
-/// A part of the globe that a view may begin over.
-struct Region {
-  geo::LatLon middle;
-  double tall = 0, wide = 0;   ///< metres
-  Metres spacing{0};
-};
-
-constexpr double kRegional = 1.0;  ///< radians from south to north, at most
-
-/// Nothing if the raster shows much of the body.
-std::optional<Region> region_of(const source::RasterDescription& raster, double a) {
-  const auto& b = raster.bounds;
-  if (b.north.value - b.south.value >= kRegional) return std::nullopt;
-  const double latitude = 0.5 * (b.south.value + b.north.value);
-  const double tall = (b.north.value - b.south.value) * a;
-  constexpr double kPole = std::numbers::pi / 2, kNearly = 1e-3;
-  if (b.east.value - b.west.value > 2.0 * std::numbers::pi - kNearly && std::max(b.north.value, -b.south.value) > kPole - kNearly)
-    return Region{{Radians(std::copysign(kPole, latitude)), Radians(0)}, 2.0 * tall, 2.0 * tall, raster.spacing};  // all round a pole
-  const double wide = std::min((b.east.value - b.west.value) * std::cos(latitude), kPole) * a;
-  return Region{{Radians(latitude), Radians(0.5 * (b.west.value + b.east.value))}, tall, wide, raster.spacing};
-}
-
-/// The same of what is known of a catalogue.
-std::optional<Region> region_of(const source::Catalogue& catalogue, double a) {
-  glm::dvec3 sum(0.0);
-  Metres spacing(std::numeric_limits<double>::infinity());
-  for (const auto& set : catalogue.sets()) {
-    sum += set->footprint.cap().middle;
-    spacing = std::min(spacing, set->footprint.spacing());
-  }
-  if (glm::length(sum) < 1e-3) return std::nullopt;
-  const glm::dvec3 middle = glm::normalize(sum);
-  double radius = 0;
-  for (const auto& set : catalogue.sets()) {
-    const source::SphereCap& cap = set->footprint.cap();
-    radius = std::max(radius, std::acos(std::clamp(glm::dot(middle, cap.middle), -1.0, 1.0)) + std::acos(std::clamp(cap.cosine, -1.0, 1.0)));
-  }
-  if (2.0 * radius >= kRegional) return std::nullopt;
-  return Region{geo::place_of_normal(geo::Vector<geo::Ecef>{middle}), 2.0 * radius * a, 2.0 * radius * a, spacing};
-}
-
-}  // namespace
-
-view::Pose Globe::home() const { return home_of(layer_order()); }
-view::Pose Globe::home(std::size_t layer) const { return home_of({layer}); }
-
-view::Pose Globe::home_of(const std::vector<std::size_t>& layers) const {
-  const double a = ellipsoid().a();
-  view::Pose pose;
-  std::optional<Region> finest;
-  for (const std::size_t i : layers) {
-    const auto catalogue = catalogue_of(i);
-    const auto raster = shown_raster(i);
-    const auto region = raster ? region_of(raster->description(), a) : catalogue ? region_of(*catalogue, a) : std::nullopt;
-    if (region && (!finest || region->spacing < finest->spacing)) finest = region;
-  }
-  if (!finest) {
-    pose.position = {to_radians(Degrees(20.0)), to_radians(Degrees(10.0)), EllipsoidalHeight(2.2 * a)};
-    return pose;
-  }
-  // The default view is 45 degrees high and a good deal wider; a tenth of room all round.
-  const double height = 1.2 * std::max(finest->tall, finest->wide / 1.5) / (2.0 * std::tan(to_radians(Degrees(22.5)).value));
-  pose.position = {finest->middle.latitude, finest->middle.longitude, EllipsoidalHeight(std::max(height, 100.0))};
-  if (auto sampler = height_sampler()) {
-    if (const auto ground = sampler->height_at(geo::place_of(pose.position))) pose.position.height.value += std::max(ground->height.value, 0.0);
-  }
-  return pose;
-}
 
 Result<std::shared_ptr<LayerCatalogue>> Globe::State::catalogue_to_change(std::size_t layer) {
   std::lock_guard lock(mutex);
