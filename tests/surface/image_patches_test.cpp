@@ -270,21 +270,26 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
       const geo::TileKey key = geo::tile_at(geo::normal_at(at(lat, lon)), level);
       CAPTURE(geo::to_string(key));
       const TileImagery imagery = pictures.of(key);
-      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger. Places are right to a third of a texel; beyond the border it fades over a pixel of the
-      // source or a texel, which measures up to 1.7 times its nominal size in longitude.
-      const double texel = to_degrees(geo::tile_angle(level)).value / 248;
-      const double blur = std::max(0.02, texel) * 4;
-      for (int i = 0; i < 2000; ++i) {
-        const glm::dvec2 st = slot_st(share(random), share(random));
+      // Bilinear filtering blurs by a pixel of the source or of the window, whichever is larger.
+      const double blur = std::max(0.02, to_degrees(geo::tile_angle(level)).value / 248) * 4;
+      const auto degrees_of = [&](glm::dvec2 st) {
         const geo::LatLon place = geo::place_of_normal(geo::tile_normal(key, st));
-        const double latitude = to_degrees(place.latitude).value, longitude = to_degrees(place.longitude).value;
+        return glm::dvec2(to_degrees(place.latitude).value, to_degrees(place.longitude).value);
+      };
+      for (int i = 0; i < 2000; ++i) {
+        const glm::dvec2 st = slot_st(share(random), share(random)), here = degrees_of(st);
+        const double latitude = here.x, longitude = here.y;
         const double within = std::min({latitude - 40, 50 - latitude, longitude - 10, 20 - longitude});
+        // A texel of the slot there, in degrees on the wider axis. Places are right to a third of it; beyond the border it fades over a pixel
+        // of the source or a texel, and a texel's width varies by less than a tenth within that.
+        const glm::dvec2 along_s = degrees_of(st + glm::dvec2(1.0 / 248, 0)) - here, along_t = degrees_of(st + glm::dvec2(0, 1.0 / 248)) - here;
+        const double texel = 1.1 * std::max(std::hypot(along_s.x, along_t.x), std::hypot(along_s.y, along_t.y));
         const double from_void = std::max(std::abs(latitude - 45), std::abs(longitude - 15));
         const glm::dvec4 colour = composed(imagery, st);
-        if (within < -std::max(0.02, 2 * texel)) {
+        if (within < -(std::max(0.02, texel) + texel / 3)) {
           REQUIRE(colour == glm::dvec4(0));
           ++outside;
-        } else if (within > texel && from_void > 0.2 + blur) {
+        } else if (within > texel / 3 && from_void > 0.2 + blur) {
           REQUIRE(glm::distance(colour, glm::dvec4(200, 100, 50, 255)) < 1.01);
           ++inside;
         } else if (from_void < 0.18 - blur) {
