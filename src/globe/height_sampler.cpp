@@ -118,16 +118,19 @@ HeightSampler::AnswerNow HeightSampler::height_now(const geo::LatLon& place, Met
   const double coarsest = global ? global->spacing() : std::numeric_limits<double>::infinity();
   source::Awaited none;
   // Ever coarser samples, until some are in memory; few steps, for each is twice as coarse.
-  for (double spacing = wanted_spacing.value; s.idle && spacing < coarsest;) {
+  double spacing = wanted_spacing.value;
+  bool is_wanted = true;
+  while (s.idle && (is_wanted || spacing < coarsest)) {
     const auto found = s.idle->height_at(place, surface::Lookup::bilinear, spacing);
     const bool known = found && !s.idle->take_pending(none);
-    if (known) return {{EllipsoidalHeight(found->metres), s.level_of(found->spacing)}, spacing == wanted_spacing.value};
-    if (spacing == wanted_spacing.value) s.ask_for(place, spacing);
+    if (known) return {{EllipsoidalHeight(found->metres), s.level_of(found->spacing)}, is_wanted};
+    if (is_wanted) s.ask_for(place, spacing);
     if (!found || !std::isfinite(found->spacing)) break;
     spacing = 2.0 * std::max(spacing, found->spacing);
+    is_wanted = false;
   }
   if (!global) return {{EllipsoidalHeight(0.0), -1.0}, false};
-  return {{EllipsoidalHeight(global->at(place)), s.level_of(global->spacing())}, wanted_spacing.value >= coarsest};
+  return {{EllipsoidalHeight(global->at(place)), s.level_of(global->spacing())}, false};
 }
 
 Result<geo::Vector<geo::Ecef>> HeightSampler::normal_at(const geo::LatLon& place, Metres wanted_spacing) {

@@ -23,8 +23,12 @@ struct ResidentHeights::State {
   std::chrono::steady_clock::time_point not_before{};
 
   /// Whether the grid of `wanted` is to be asked for now. With the lock held.
-  bool may_begin(const surface::SurfaceDescription& wanted) const {
-    if (making || (surface && surface->heights == wanted.heights)) return false;
+  bool may_begin(const std::shared_ptr<const surface::SurfaceDescription>& wanted) {
+    if (making || surface == wanted) return false;
+    if (surface && surface->heights == wanted->heights) {
+      surface = wanted;  // lets go of what else the old one held
+      return false;
+    }
     return std::chrono::steady_clock::now() >= not_before && std::ranges::all_of(awaited, [](const auto& arrival) { return arrival->over(); });
   }
 
@@ -55,7 +59,7 @@ ResidentHeights::ResidentHeights(Submit submit) : submit_(std::move(submit)), st
 
 std::shared_ptr<const surface::GlobalHeights> ResidentHeights::of(const std::shared_ptr<const surface::SurfaceDescription>& surface) {
   std::lock_guard lock(state_->mutex);
-  if (state_->may_begin(*surface)) state_->making = submit_([state = state_, surface](SurfaceWorker& worker) { state->make(worker, surface); });
+  if (state_->may_begin(surface)) state_->making = submit_([state = state_, surface](SurfaceWorker& worker) { state->make(worker, surface); });
   return state_->grid;
 }
 
