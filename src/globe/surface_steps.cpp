@@ -101,9 +101,11 @@ SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step)
     timed.open.splice(timed.open.begin(), timed.open, held);
     return held->second;
   };
+  std::uint64_t reopened = 0;
   {
     std::lock_guard lock(mutex_);
     if (const auto source = find()) return *source;
+    reopened = reopened_;
   }
   auto opened = open_(spec_of_step(layer.spec, timed.times.text(step)));
   std::lock_guard lock(mutex_);
@@ -116,7 +118,7 @@ SurfaceSteps::Source SurfaceSteps::source_of(OneLayer& layer, std::int64_t step)
     timed.failures.last_error = opened.error().message;
   }
   if (timed.ids.emplace(step, next_id_).second) ++next_id_;
-  if (layer.removed) return source;
+  if (layer.removed || reopened != reopened_) return source;
   timed.open.emplace_front(step, source);
   if (timed.open.size() > kHeldSources) timed.open.pop_back();
   return source;
@@ -141,8 +143,10 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
     if (auto same = held_at(time)) return same;
     Steps steps;
     std::vector<OneLayer*> timed;  // null: nothing of it is to be opened
+    std::uint64_t reopened = 0;
     {
       std::lock_guard lock(mutex_);
+      reopened = reopened_;
       find_steps(time, steps);
       for (OneLayer& layer : layers_) timed.push_back(layer.timed && layer.settings.enabled ? &layer : nullptr);
     }
@@ -150,9 +154,9 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::at(const std::o
     for (std::size_t i = 0; i < timed.size(); ++i) sources.push_back(timed[i] ? source_of(*timed[i], steps[i]) : nullptr);
     std::lock_guard lock(mutex_);
     if (auto same = held(steps)) return same;
-    bool complete = steps.size() == layers_.size();
+    bool complete = steps.size() == layers_.size() && reopened == reopened_;
     for (std::size_t i = 0; complete && i < timed.size(); ++i) complete = timed[i] || !layers_[i].timed || !layers_[i].settings.enabled;
-    if (!complete) continue;  // layers have been added or switched on meanwhile
+    if (!complete) continue;  // layers have been added, switched on or reopened meanwhile
     auto description = describe(steps, sources);
     surfaces_.emplace_front(std::move(steps), description);
     if (surfaces_.size() > kHeldSurfaces) surfaces_.pop_back();
@@ -228,6 +232,7 @@ void SurfaceSteps::reopen_steps(std::size_t layer) {
   OneLayer& one = layers_[layer];
   if (one.removed || !one.timed) return;
   ++one.content;
+  ++reopened_;
   one.timed->open.clear();
   one.timed->failures = {};
   describe_anew();

@@ -112,6 +112,7 @@ class SurfaceSteps {
   bool has_times_ = false;          ///< some layer has
   std::vector<std::size_t> order_;  ///< in which layers are drawn
   std::uint32_t next_id_ = 0;
+  std::uint64_t reopened_ = 0;      ///< calls of reopen_steps: what was opened before the last may be old
   std::uint64_t last_revision_ = 0;
   Steps asked_steps_;               ///< of the last question: frames ask, and must not allocate
   std::list<std::pair<Steps, std::shared_ptr<const surface::SurfaceDescription>>> surfaces_;  ///< the most recently used first

@@ -1,6 +1,8 @@
 #include "globe/surface_steps.h"
 
+#include <functional>
 #include <set>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -17,6 +19,7 @@ UtcTime utc(const char* text) { return parse_utc(text).value(); }
 /// A layer of the years 2000, 2010 and 2020 over one without times; says which paths were opened, and cannot open 2010.
 struct Steps {
   std::vector<std::string> opened;
+  std::function<void()> while_opening;  ///< called once
   SurfaceSteps steps;
 
   static LayerInfo fixed() {
@@ -35,6 +38,7 @@ struct Steps {
 
   Steps() : steps(geo::kWgs84, {timed(), fixed()}, [this](const LayerSpec& spec) -> Result<std::unique_ptr<source::RasterSource>> {
     opened.push_back(spec.source.path.string());
+    if (while_opening) std::exchange(while_opening, {})();
     if (opened.back() == "/data/2010.tif") return Error{ErrorCode::not_found, "/data/2010.tif: there is no such file"};
     return source::open_tile_index({true, 256}, geo::kWgs84);
   }) {}
@@ -82,6 +86,22 @@ TEST_CASE("SurfaceSteps: a step that cannot be opened is left out and told of") 
   CHECK(made.steps.failures_of(0).count == 1);
   CHECK(made.steps.failures_of(0).last_error == "/data/2010.tif: there is no such file");
   CHECK(made.steps.at(utc("2021-01-01"))->colours.size() == 2);
+}
+
+TEST_CASE("SurfaceSteps: steps are opened and read anew, also where they were being opened just then") {
+  Steps made;
+  const auto before = made.steps.at(utc("2000-01-01"));
+  made.steps.reopen_steps(0);
+  CHECK(made.steps.held_at(utc("2000-01-01")) == nullptr);
+  made.while_opening = [&] { made.steps.reopen_steps(0); };
+  const auto after = made.steps.at(utc("2000-01-01"));
+  CHECK(made.opened.size() == 3);
+  CHECK(after->colours[0].source != before->colours[0].source);
+  CHECK(after->colours[0].source_id == before->colours[0].source_id);
+  CHECK(after->colours[0].content == 2);
+  CHECK(after->colours[1] == before->colours[1]);
+  CHECK(made.steps.at(utc("2000-01-01")) == after);
+  CHECK(made.opened.size() == 3);
 }
 
 TEST_CASE("SurfaceSteps: layers come over the others of their group and go, and the others keep their numbers") {
