@@ -41,7 +41,7 @@ class LoadingAll(Case):
     def server(self):
         port = free_port()
         process = subprocess.Popen([sys.executable, SERVER, "--port", str(port), "--cache", self.folder / "painted", "--delay-ms", "20",
-                                    "--max-seconds", str(2 * SECONDS)], stdout=subprocess.DEVNULL)
+                                    "--max-seconds", str(2 * SECONDS)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         for _ in range(100):

@@ -101,6 +101,19 @@ TEST_CASE("open_cesium_terrain: tiles lie where the layer says, and those that i
   CHECK(accepts);
 }
 
+TEST_CASE("open_cesium_terrain: a parent is told of, since its tiles are not read") {
+  const LittleServer server([&](const Ask& ask) { return serve(ask, R"({"parentUrl": "../world/layer.json?key=secret", )" + std::string(kLayer).substr(1)); });
+  CesiumTerrain terrain;
+  terrain.url = server.url("/terrain/layer.json?token=sesame");
+  const auto source = open_cesium_terrain(terrain, geo::kWgs84, made_store());
+  REQUIRE(source);
+  REQUIRE((*source)->description().hints.size() == 1);
+  const std::string& hint = (*source)->description().hints.front();
+  CHECK(hint.find("/world/layer.json") != std::string::npos);
+  CHECK(hint.find("secret") == std::string::npos);
+  CHECK(hint.find("sesame") == std::string::npos);
+}
+
 TEST_CASE("open_cesium_terrain: headers go to the layer's own server only") {
   for (const bool elsewhere : {false, true}) {
     std::atomic<int> with{0}, without{0};

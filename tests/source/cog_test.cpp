@@ -42,6 +42,7 @@ class RangeServer {
   explicit RangeServer(std::string file)
       : file_(std::move(file)), server_([this](const Ask& ask) {
           const std::size_t at = ask.headers.find("Range: bytes=");
+          for (int i = 0; holds_ && i < 20'000; ++i) std::this_thread::sleep_for(1ms);
           const Say say = test::part_of(file_, ask, "\"1\"");
           std::lock_guard lock(mutex_);
           if (at == std::string::npos) return say;
@@ -69,7 +70,7 @@ class RangeServer {
     }
     return twice;
   }
-  std::atomic<bool> broken_{false}, garbles_{false};
+  std::atomic<bool> broken_{false}, garbles_{false}, holds_{false};
 
  private:
   std::string file_;
@@ -190,6 +191,40 @@ TEST_CASE("open_cog: real files") {
   }
   if (const auto path = test::shared_data("earth/regional/mosaic_cog1.tif")) compare(*path, SampleKind::colour, geo::kWgs84);
   if (const auto path = test::shared_data("mars/cog_hirise_mars.tif")) compare(*path, SampleKind::colour, geo::Ellipsoid(Metres(3396190.0), Metres(3396190.0)));
+}
+
+TEST_CASE("open_cog: no read waits, neither for blocks nor for where they lie") {
+  MadeRaster raster = large_raster({"TILED=YES", "BLOCKXSIZE=16", "BLOCKYSIZE=16", "BIGTIFF=YES"});
+  raster.width = raster.height = 2048;  // 16,384 blocks: some 200 KB say where they are
+  raster.values = {test::ramp(2048 * 2048, -20'000, 1.0 / 128)};
+  const MadeFile file("cog_index.tif", raster);
+  RangeServer server(bytes_of(file.path()));
+  GdalOptions options;
+  options.path = server.url();
+  options.vertical = "ellipsoid";
+  const auto source = open_cog(options, {}, geo::kWgs84, store());
+  REQUIRE(source);
+  auto reader = (*source)->open_reader();
+  REQUIRE(reader);
+  const PixelWindow window{1200, 1200, 48, 48};
+  int rounds = 0;
+  for (bool done = false; !done; ++rounds) {
+    server.holds_ = true;
+    const auto read = (*reader)->read_heights(0, window);  // a reader that waited would get its bytes after 20 s only
+    server.holds_ = false;
+    done = read.has_value();
+    if (done) {
+      CHECK(read->at(0, 0) == static_cast<float>(std::round(raster.values[0][1200 * 2048 + 1200])));
+      break;
+    }
+    REQUIRE(read.error().code == ErrorCode::pending);
+    const auto awaited = (*reader)->take_awaited();
+    REQUIRE_FALSE(awaited.empty());
+    for (const auto& arrival : awaited) REQUIRE(arrival->wait_for(20s));
+  }
+  CHECK_MESSAGE(rounds >= 2, "the index and then the blocks");
+  CHECK(rounds <= 5);
+  CHECK(server.sent_twice() == 0);
 }
 
 TEST_CASE("open_cog: a part that cannot be had is an error, and is there once the server is well again") {

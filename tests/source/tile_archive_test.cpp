@@ -303,6 +303,47 @@ TEST_CASE("open_geopackage: heights in UTM as GDAL wrote them, with a scale per 
   }
 }
 
+TEST_CASE("open_geopackage: heights in feet, at cells' corners, and in no length") {
+  const Folder folder("gpkg_unit");
+  GDALAllRegister();
+  const auto file = folder / "feet.gpkg";
+  {
+    GDALDatasetUniquePtr memory(GetGDALDriverManager()->GetDriverByName("MEM")->Create("", 8, 8, 1, GDT_Float32, nullptr));
+    std::array<double, 6> transform{500'000, 30, 0, 5'000'000, 0, -30};
+    memory->SetGeoTransform(transform.data());
+    OGRSpatialReference crs;
+    crs.importFromEPSG(32633);
+    memory->SetSpatialRef(&crs);
+    REQUIRE(memory->GetRasterBand(1)->Fill(1000.0) == CE_None);
+    GDALDatasetUniquePtr copy(GetGDALDriverManager()->GetDriverByName("GPKG")->CreateCopy(file.c_str(), memory.get(), FALSE, nullptr, nullptr, nullptr));
+    REQUIRE(copy);
+  }
+  const auto declare = [&](const std::string& column, const std::string& value) {
+    Database(file).run(fmt::format("UPDATE gpkg_2d_gridded_coverage_ancillary SET {} = '{}'", column, value));
+  };
+  TileArchive archive = archive_at(file, SampleKind::height);
+  archive.vertical = "ellipsoid";
+  const auto height = [&] {
+    const Source source = open_geopackage(archive, geo::kWgs84);
+    REQUIRE_MESSAGE(source, (source ? "" : source.error().message));
+    auto reader = (*source)->open_reader();
+    REQUIRE(reader);
+    return (*reader)->read_heights(0, {3, 3, 1, 1}).value().metres.front();
+  };
+  CHECK(height() == 1000.0f);
+  declare("uom", "ft");
+  CHECK(height() == doctest::Approx(304.8));
+  declare("uom", "http://www.opengis.net/def/uom/UCUM/[ft_us]");
+  CHECK(height() == doctest::Approx(304.800610));
+  declare("uom", "furlong");
+  CHECK(height() == 1000.0f);
+  CHECK(open_geopackage(archive, geo::kWgs84).value()->description().hints.size() == 1);
+  declare("uom", "m");
+  CHECK(open_geopackage(archive, geo::kWgs84).value()->description().hints.empty());
+  declare("grid_cell_encoding", "grid-value-is-corner");
+  CHECK(open_geopackage(archive, geo::kWgs84).value()->description().hints.size() == 1);
+}
+
 TEST_CASE("open_geopackage: one of several tables, and what cannot be shown is said") {
   const Folder folder("gpkg_tables");
   GDALAllRegister();

@@ -14,6 +14,7 @@
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/jpeg_header.h"
 #include "source/gdal/unpacked_copy.h"
+#include "source/length_unit.h"
 #include "source/undeclared_voids.h"
 
 namespace tellurion::source {
@@ -133,19 +134,7 @@ bool contains_word(std::string text, std::initializer_list<const char*> words) {
 }
 
 /// Metres of one unit of the band; nothing if it names no length.
-std::optional<double> unit_of(GDALRasterBand& band) {
-  struct Unit {
-    const char* name;
-    double metres;
-  };
-  const std::string name(band.GetUnitType());
-  for (const Unit& unit : {Unit{"m", 1.0}, Unit{"metre", 1.0}, Unit{"meter", 1.0}, Unit{"metres", 1.0}, Unit{"meters", 1.0}, Unit{"ft", 0.3048},
-                           Unit{"foot", 0.3048}, Unit{"feet", 0.3048}, Unit{"us-ft", 1200.0 / 3937.0}, Unit{"US survey foot", 1200.0 / 3937.0},
-                           Unit{"km", 1000.0}, Unit{"dm", 0.1}, Unit{"cm", 0.01}, Unit{"mm", 0.001}}) {
-    if (EQUAL(name.c_str(), unit.name)) return unit.metres;
-  }
-  return std::nullopt;
-}
+std::optional<double> unit_of(GDALRasterBand& band) { return metres_of_unit(band.GetUnitType()); }
 
 SampleKind guess_kind(GDALDataset& dataset) {
   GDALRasterBand* band = dataset.GetRasterBand(1);

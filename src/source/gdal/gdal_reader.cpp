@@ -51,13 +51,14 @@ Result<std::unique_ptr<GdalReader>> GdalReader::open(std::shared_ptr<const GdalL
     datum = std::move(made).value();
   }
   std::unique_ptr<GdalReader> reader(new GdalReader(std::move(layout), std::move(mapping).value(), std::move(datum)));
+  if (reader->layout_->remote) return reader;  // a read opens it, without waiting
   if (Result<void> opened = reader->open_again(); !opened) return opened.error();
   return reader;
 }
 
 Result<void> GdalReader::open_again() {
   if (layout_->remote) {
-    Result<RemoteDataset> opened = open_remote_tiff(layout_->remote);
+    Result<RemoteDataset> opened = open_remote_tiff(layout_->remote, &awaited_);
     if (!opened) return opened.error();
     dataset_ = std::move(opened->dataset);
     mount_ = std::move(opened->mount);

@@ -15,7 +15,7 @@ namespace tellurion::source {
 
 class GdalReader final : public RasterReader {
  public:
-  /// Opens the layout's file anew. Errors: as opening; unavailable if the file has changed since.
+  /// Opens the layout's file anew; a remote one with the first read. Errors: as opening; unavailable if the file has changed since.
   static Result<std::unique_ptr<GdalReader>> open(std::shared_ptr<const GdalLayout> layout);
 
   Result<raster::HeightGrid> read_heights(int level, const PixelWindow& window) override;
@@ -45,10 +45,10 @@ class GdalReader final : public RasterReader {
   Result<Data> averaged(int level, const PixelWindow& window, const Read& read) const;
 
   std::shared_ptr<const GdalLayout> layout_;
-  std::unique_ptr<RemoteMount> mount_;  ///< of a remote file; outlives the data set
-  GDALDatasetUniquePtr dataset_;        ///< none: a part of it could not be read, it has to be opened again
+  Awaited awaited_;                       ///< outlives the mount
+  std::unique_ptr<RemoteMount> mount_;    ///< of a remote file; outlives the data set
+  GDALDatasetUniquePtr dataset_;          ///< none: a part of it could not be read, it has to be opened again
   std::unique_ptr<RemoteBlocks> blocks_;  ///< of a remote file
-  Awaited awaited_;
   PixelMapping mapping_;
   std::optional<VerticalDatum> datum_;
   std::vector<Range> ranges_;  ///< of the colour bands: what is black and white; empty until needed

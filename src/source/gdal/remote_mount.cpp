@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 #include <utility>
+#include <variant>
 
 #include <cpl_conv.h>
 #include <cpl_vsi_virtual.h>
@@ -17,10 +18,24 @@ namespace {
 
 constexpr std::chrono::milliseconds kPatience{30'000};  ///< for a chunk
 constexpr std::size_t kMostKeptChunks = 256;
+constexpr double kIndexGain = 0.0;  ///< more than that of any block, of which nothing is known without it
 
 }  // namespace
 
-Result<std::shared_ptr<const std::string>> RemoteChunks::chunk(std::uint64_t index) const {
+Result<std::shared_ptr<const std::string>> RemoteChunks::fetched(const fetch::ByteRange& part, Awaited* awaited) const {
+  if (!awaited) return file_->wait_for(part, kPatience);
+  fetch::Asked asked = file_->ask(part, kIndexGain);
+  if (auto* failure = std::get_if<Error>(&asked)) return std::move(*failure);
+  if (auto* arrival = std::get_if<std::shared_ptr<fetch::Arrival>>(&asked)) {
+    awaited->push_back(std::move(*arrival));
+    return Error{ErrorCode::pending, file_->name()};
+  }
+  auto& bytes = std::get<fetch::File>(asked).bytes;
+  if (!bytes) return Error{ErrorCode::unavailable, fmt::format("{}: has gone from the server", file_->name())};
+  return std::move(bytes);
+}
+
+Result<std::shared_ptr<const std::string>> RemoteChunks::chunk(std::uint64_t index, Awaited* awaited) const {
   const std::uint64_t offset = index * kChunkBytes;
   if (offset == 0 && file_->head()->size() == std::min<std::uint64_t>(kChunkBytes, file_->size())) return file_->head();
   {
@@ -28,10 +43,11 @@ Result<std::shared_ptr<const std::string>> RemoteChunks::chunk(std::uint64_t ind
     if (const auto found = kept_.find(index); found != kept_.end()) return found->second;
   }
   const std::uint64_t size = file_->size();
-  Result<std::shared_ptr<const std::string>> bytes = file_->wait_for({offset, std::min<std::uint64_t>(kChunkBytes, size - std::min(offset, size))}, kPatience);
+  auto bytes = fetched({offset, std::min<std::uint64_t>(kChunkBytes, size - std::min(offset, size))}, awaited);
   if (!bytes) return bytes;
   std::lock_guard lock(mutex_);
-  if (kept_.size() < kMostKeptChunks) kept_.emplace(index, *bytes);
+  if (kept_.size() >= kMostKeptChunks) kept_.clear();  // an index of a hundred thousand blocks has some twenty
+  kept_.emplace(index, *bytes);
   return bytes;
 }
 
@@ -51,6 +67,7 @@ std::shared_ptr<const std::string> RemoteChunks::kept(const fetch::ByteRange& pa
 
 struct RemoteMount::State {
   std::shared_ptr<const RemoteChunks> chunks;
+  Awaited* awaited = nullptr;
   std::map<std::uint64_t, std::shared_ptr<const std::string>> pieces;  ///< by their offset
   std::optional<Error> failure;
 
@@ -68,7 +85,7 @@ std::size_t RemoteMount::State::read(std::uint64_t offset, char* out, std::size_
     const auto& [begin, bytes] = *std::prev(after);
     if (offset - begin < bytes->size()) return copy(*bytes, offset - begin);
   }
-  const Result<std::shared_ptr<const std::string>> chunk = chunks->chunk(offset / RemoteChunks::kChunkBytes);
+  const Result<std::shared_ptr<const std::string>> chunk = chunks->chunk(offset / RemoteChunks::kChunkBytes, awaited);
   if (!chunk) {
     failure = chunk.error();
     return 0;
@@ -178,8 +195,9 @@ RemoteFileSystem& file_system() {
 
 }  // namespace
 
-RemoteMount::RemoteMount(std::shared_ptr<const RemoteChunks> chunks) : state_(std::make_shared<State>()) {
+RemoteMount::RemoteMount(std::shared_ptr<const RemoteChunks> chunks, Awaited* awaited) : state_(std::make_shared<State>()) {
   state_->chunks = std::move(chunks);
+  state_->awaited = awaited;
   path_ = file_system().add(state_);
 }
 
@@ -190,12 +208,12 @@ void RemoteMount::put(std::uint64_t offset, std::shared_ptr<const std::string> b
 void RemoteMount::drop_pieces() { state_->pieces.clear(); }
 const std::optional<Error>& RemoteMount::failure() const { return state_->failure; }
 
-Result<RemoteDataset> open_remote_tiff(std::shared_ptr<const RemoteChunks> chunks) {
+Result<RemoteDataset> open_remote_tiff(std::shared_ptr<const RemoteChunks> chunks, Awaited* awaited) {
   prepare_gdal();
   const QuietErrors quiet;
   const std::string& name = chunks->file().name();
   RemoteDataset opened;
-  opened.mount = std::make_unique<RemoteMount>(chunks);
+  opened.mount = std::make_unique<RemoteMount>(chunks, awaited);
   constexpr std::array<const char*, 2> kDrivers{"GTiff", nullptr};
   opened.dataset.reset(GDALDataset::Open(opened.mount->path().c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, kDrivers.data()));
   if (opened.mount->failure()) return *opened.mount->failure();

@@ -13,6 +13,7 @@
 
 #include "base/result.h"
 #include "fetch/remote_file.h"
+#include "source/raster_source.h"
 
 namespace tellurion::source {
 
@@ -29,10 +30,12 @@ class RemoteChunks {
   const fetch::RemoteFile& file() const { return *file_; }
   /// Bytes that have come with chunks; null if some of them have not.
   std::shared_ptr<const std::string> kept(const fetch::ByteRange& part) const;
-  /// Waits for the chunk. Errors: as RemoteFile's.
-  Result<std::shared_ptr<const std::string>> chunk(std::uint64_t index) const;
+  /// The chunk, which is waited for, or, with `awaited`, asked for: its arrival is added there. Errors: as RemoteFile's; pending.
+  Result<std::shared_ptr<const std::string>> chunk(std::uint64_t index, Awaited* awaited) const;
 
  private:
+  Result<std::shared_ptr<const std::string>> fetched(const fetch::ByteRange& part, Awaited* awaited) const;
+
   std::shared_ptr<const fetch::RemoteFile> file_;
   mutable std::mutex mutex_;  ///< guards what follows
   mutable std::map<std::uint64_t, std::shared_ptr<const std::string>> kept_;
@@ -42,7 +45,8 @@ class RemoteChunks {
 /// Not thread-safe.
 class RemoteMount {
  public:
-  explicit RemoteMount(std::shared_ptr<const RemoteChunks> chunks);
+  /// Reads wait for what has not come; with `awaited`, which outlives this, they fail as pending and put the arrivals there.
+  explicit RemoteMount(std::shared_ptr<const RemoteChunks> chunks, Awaited* awaited = nullptr);
   ~RemoteMount();
   RemoteMount(const RemoteMount&) = delete;
   RemoteMount& operator=(const RemoteMount&) = delete;
@@ -71,7 +75,8 @@ struct RemoteDataset {
   GDALDatasetUniquePtr dataset;
 };
 
-/// Opens a GeoTIFF; waits for its directories. Errors: as RemoteFile's; corrupt, unsupported (no GeoTIFF), naming the file.
-Result<RemoteDataset> open_remote_tiff(std::shared_ptr<const RemoteChunks> chunks);
+/// Opens a GeoTIFF; its directories are waited for, or asked for (see RemoteMount). Errors: as RemoteFile's; pending; corrupt,
+/// unsupported (no GeoTIFF), naming the file.
+Result<RemoteDataset> open_remote_tiff(std::shared_ptr<const RemoteChunks> chunks, Awaited* awaited = nullptr);
 
 }  // namespace tellurion::source

@@ -155,6 +155,7 @@ Result<CesiumLayer> parse_cesium_layer(std::string_view text, const std::string&
   made.max_zoom = finest_level(layer, made);
   made.bounds = read_bounds(layer);
   made.attribution = text_of(layer, "attribution", "");
+  if (const std::string parent = text_of(layer, "parentUrl", ""); !parent.empty()) made.parent_url = resolved_url(url, parent);
   return made;
 }
 

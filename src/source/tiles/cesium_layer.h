@@ -36,6 +36,7 @@ struct CesiumLayer {
   bool lists_more = false;
   std::optional<std::array<double, 4>> bounds;  ///< west, south, east, north in degrees, west < east
   std::string attribution;
+  std::string parent_url;  ///< of the layer whose tiles stand in for those that this one lacks, absolute; empty: there is none
 
   /// Whether the tile may be there; `rows`: of its level.
   bool may_have(const TileAddress& tile, std::int64_t rows) const;

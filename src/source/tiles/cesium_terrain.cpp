@@ -78,6 +78,9 @@ Result<std::unique_ptr<RasterSource>> open_cesium_terrain(const CesiumTerrain& t
   pyramid.bounds = layer->bounds;
   pyramid.vertical = terrain.vertical.value_or(kEllipsoidDatum);
   pyramid.attribution = layer->attribution;
+  if (!layer->parent_url.empty())
+    pyramid.hints.push_back(fmt::format("{} lacks tiles that another service has ({}): make that one a layer of its own, before this one.",
+                                        fetch::public_part(terrain.url), fetch::public_part(layer->parent_url)));
   std::vector<std::int64_t> rows;
   for (const TileLevel& level : pyramid.grid.levels) rows.push_back(level.rows);
   const auto may_have = [layer = std::move(*layer), rows = std::move(rows)](const TileAddress& tile) {

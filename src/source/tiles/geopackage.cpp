@@ -17,6 +17,7 @@
 
 #include "source/gdal/picture_file.h"
 #include "source/grid_coverage.h"
+#include "source/length_unit.h"
 #include "source/proj/pixel_mapping.h"
 #include "source/tiles/archive_tile.h"
 #include "source/tiles/height_decoders.h"
@@ -29,12 +30,14 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Metres of a picture's number: (number * tile's scale + tile's offset) * scale + offset. A supply of gridded heights puts
-/// the tile's two in front of the tile's bytes.
+/// Metres of a picture's number: ((number * tile's scale + tile's offset) * scale + offset) * unit. A supply of gridded heights
+/// puts the tile's two in front of the tile's bytes.
 struct GriddedHeights {
   double scale = 1.0;
   double offset = 0.0;
+  double unit = 1.0;   ///< metres
   double null = kNaN;  ///< the number that means "no data"
+  std::vector<std::string> hints{};
 };
 using TileScale = std::array<double, 2>;  ///< scale, offset
 
@@ -88,18 +91,28 @@ Result<raster::HeightGrid> gridded_heights(const std::string& bytes, const Gridd
     if (std::isnan(metres)) continue;
     metres = number == heights.null || number == static_cast<double>(static_cast<float>(heights.null))
                  ? raster::kNoHeight
-                 : static_cast<float>((number * tile[0] + tile[1]) * heights.scale + heights.offset);
+                 : static_cast<float>(((number * tile[0] + tile[1]) * heights.scale + heights.offset) * heights.unit);
   }
   return grid;
 }
 
-/// The numbers of gridded heights; none if the table is one of pictures.
-Result<std::optional<GriddedHeights>> heights_of(const SqliteArchive& database, const std::string& table) {
+/// What is said of the numbers in `table`. Errors: corrupt.
+Result<GriddedHeights> heights_of(const SqliteArchive& database, const std::string& table) {
   const auto rows = database.rows("SELECT scale, \"offset\", data_null FROM gpkg_2d_gridded_coverage_ancillary WHERE tile_matrix_set_name = ?", {table}, 1);
   if (!rows) return rows.error();
   if (rows->empty()) return Error{ErrorCode::corrupt, fmt::format("{}: says nothing of the heights in its table {}", database.name(), table)};
   const SqlRow& row = rows->front();
-  return std::optional(GriddedHeights{number_of(row[0], 1.0), number_of(row[1], 0.0), number_of(row[2], kNaN)});
+  GriddedHeights heights{number_of(row[0], 1.0), number_of(row[1], 0.0), 1.0, number_of(row[2], kNaN)};
+  // Columns that the first edition of the standard lacks.
+  const auto more = database.rows("SELECT uom, grid_cell_encoding FROM gpkg_2d_gridded_coverage_ancillary WHERE tile_matrix_set_name = ?", {table}, 1);
+  if (!more || more->empty()) return heights;
+  const std::string name = text_of(more->front()[0]);
+  const std::string unit = name.substr(name.find_last_of('/') + 1);  // of the URI of a definition the end
+  if (const auto metres = metres_of_unit(unit)) heights.unit = *metres;
+  else if (!unit.empty()) heights.hints.push_back(fmt::format("{} has heights in \"{}\", which is no length that is known: they are taken as metres.", database.name(), name));
+  if (text_of(more->front()[1]) == "grid-value-is-corner")
+    heights.hints.push_back(fmt::format("{} says that its heights are those of cells' corners; they are shown at cells' centres, half a sample off.", database.name()));
+  return heights;
 }
 
 /// The table that is meant.
@@ -124,9 +137,9 @@ Result<TileTable> find_table(const SqliteArchive& database, const TileArchive& a
   if (text_of(row[1]) == "tiles") return table;
   if (archive.kind != SampleKind::height)
     return Error{ErrorCode::unsupported, fmt::format("{}: its table {} holds heights; show them as group = \"height\"", name, table.name)};
-  Result<std::optional<GriddedHeights>> heights = heights_of(database, table.name);
+  Result<GriddedHeights> heights = heights_of(database, table.name);
   if (!heights) return heights.error();
-  table.heights = *heights;
+  table.heights = std::move(*heights);
   return table;
 }
 
@@ -219,6 +232,7 @@ Result<std::unique_ptr<RasterSource>> open_geopackage(const TileArchive& archive
   pyramid.kind = archive.kind;
   if (table->heights) {
     pyramid.sample_type = "Float32";
+    pyramid.hints = table->heights->hints;
     pyramid.decode_heights = [heights = *table->heights](const std::string& bytes, const TileAddress&) { return gridded_heights(bytes, heights); };
   } else {
     pyramid.decode_heights = height_decoder(archive.encoding, pyramid.grid);

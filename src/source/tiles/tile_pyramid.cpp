@@ -173,6 +173,7 @@ Result<std::unique_ptr<RasterSource>> open_pyramid(TilePyramid pyramid, const ge
   about.kind = pyramid.kind;
   about.is_remote = pyramid.is_remote;
   about.attribution = plain_text(pyramid.attribution);
+  about.hints = std::move(pyramid.hints);
   about.wraps = mapping->wraps();
   about.band_count = pyramid.kind == SampleKind::height ? 1 : 4;
   about.sample_type = pyramid.sample_type;

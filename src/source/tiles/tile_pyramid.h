@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "geo/ellipsoid.h"
@@ -35,6 +36,7 @@ struct TilePyramid {
   std::optional<std::string> vertical;          ///< as GdalOptions::vertical
   bool is_remote = true;
   std::string attribution;       ///< whom to credit; may be HTML
+  std::vector<std::string> hints{};  ///< what a user should know of it, as sentences
   std::shared_ptr<const TileSupply> supply;
 };
 
