@@ -147,33 +147,6 @@ void measure_lookup(const source::Catalogue& catalogue, Report& report) {
   report.set("lookup_us_p99", quantile(times, 0.99), "of the same");
 }
 
-Result<double> median_frame_ms(Scene& scene, const view::Camera& camera, int count) {
-  std::vector<double> times;
-  for (int i = 0; i < count; ++i) {
-    const Stopwatch watch;
-    scene.view->draw(camera, {});
-    scene.thread->finish();
-    times.push_back(watch.ms());
-  }
-  return median(times);
-}
-
-Result<void> measure_frames(Scene& many, Scene& one, bool quick, Report& report) {
-  const view::Pose pose = pose_at(Files::kPlace[0], Files::kPlace[1], 12e3, 0.0, -90.0);
-  const view::Camera camera = camera_at(many, pose);
-  for (Scene* scene : {&many, &one}) {
-    if (auto finished = finish(*scene, camera, {}); !finished) return finished;
-  }
-  std::vector<double> ratios;
-  const int rounds = quick ? 5 : 21;
-  for (int round = 0; round < rounds; ++round) {  // in turn, so that other work on the machine falls on both
-    const auto of_many = median_frame_ms(many, camera, 5), of_one = median_frame_ms(one, camera, 5);
-    ratios.push_back(*of_many / *of_one);
-  }
-  report.set("frame_ratio", median(ratios), fmt::format("median of {} rounds of 5 frames of each; {} and {} tiles", rounds, many.view->stats().tiles_drawn, one.view->stats().tiles_drawn));
-  return {};
-}
-
 /// A raster of 15 m put over what is shown, until a frame shows all of it.
 Result<void> measure_insertion(Scene& scene, Files& files, const Body& body, Report& report) {
   const view::Camera camera = camera_at(scene, pose_at(Files::kPlace[0], Files::kPlace[1], 12e3, 0.0, -90.0));
@@ -221,7 +194,10 @@ Result<void> measure_catalogue(const Setting& setting, const Body& body, Report&
   if (!many) return many.error();
   auto one = open_scene(files->world(body, {files->cover()}), setting);
   if (!one) return one.error();
-  if (auto measured = measure_frames(*many, *one, setting.quick, report); !measured) return measured;
+  const view::Camera camera = camera_at(*many, pose_at(Files::kPlace[0], Files::kPlace[1], 12e3, 0.0, -90.0));
+  const auto ratio = frame_ratio(*many, *one, camera, setting.quick);
+  if (!ratio) return ratio.error();
+  report.set("frame_ratio", ratio->value, ratio->note);
   return measure_insertion(*many, *files, body, report);
 }
 

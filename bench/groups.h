@@ -17,5 +17,6 @@ std::vector<Benchmark> pole_benchmarks();    ///< poles.*: a pole against the eq
 std::vector<Benchmark> hole_benchmarks();    ///< holes.*: pixels that show the background
 std::vector<Benchmark> memory_benchmarks();  ///< memory.*: what a long flight takes
 std::vector<Benchmark> catalogue_benchmarks();  ///< catalogue.*: thousands of rasters as one layer
+std::vector<Benchmark> layer_benchmarks();      ///< layers.*: many layers over one another
 
 }  // namespace tellurion::bench

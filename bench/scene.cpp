@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "bench/statistics.h"
+
 namespace tellurion::bench {
 namespace {
 
@@ -22,6 +24,17 @@ Result<void> add_layers(globe::World& world, const Setting& setting, std::initia
     world.layers.push_back(std::move(spec));
   }
   return {};
+}
+
+double median_frame_ms(Scene& scene, const view::Camera& camera, int count) {
+  std::vector<double> times;
+  for (int i = 0; i < count; ++i) {
+    const Stopwatch watch;
+    scene.view->draw(camera, {});
+    scene.thread->finish();
+    times.push_back(watch.ms());
+  }
+  return median(times);
 }
 
 }  // namespace
@@ -67,6 +80,20 @@ Result<void> finish(Scene& scene, const view::Camera& camera, const globe::ViewS
   if (scene.view->finish(camera, settings, std::chrono::steady_clock::now() + kPatience)) return {};
   return {ErrorCode::unavailable, fmt::format("the view of {} was not finished within a quarter of an hour",
                                               to_text(view::pose_of(scene.globe->ellipsoid(), camera)))};
+}
+
+Result<FrameRatio> frame_ratio(Scene& a, Scene& b, const view::Camera& camera, bool quick) {
+  for (Scene* scene : {&a, &b}) {
+    if (auto finished = finish(*scene, camera, {}); !finished) return finished.error();
+  }
+  constexpr int kFrames = 5;
+  const int rounds = quick ? 5 : 21;
+  std::vector<double> ratios;
+  for (int round = 0; round < rounds; ++round) {  // in turn, so that other work on the machine falls on both
+    const double of_a = median_frame_ms(a, camera, kFrames), of_b = median_frame_ms(b, camera, kFrames);
+    ratios.push_back(of_a / of_b);
+  }
+  return FrameRatio{median(ratios), fmt::format("median of {} rounds of {} frames of each; {} and {} tiles", rounds, kFrames, a.view->stats().tiles_drawn, b.view->stats().tiles_drawn)};
 }
 
 view::Pose pose_at(double latitude, double longitude, double height, double heading, double pitch, double roll) {

@@ -49,6 +49,13 @@ Result<Scene> open_scene(globe::World world, const Setting& setting, std::size_t
 /// Errors: unavailable, if the picture is not finished within a quarter of an hour.
 Result<void> finish(Scene& scene, const view::Camera& camera, const globe::ViewSettings& settings);
 
+/// The time of `a`'s frames over that of `b`'s, in finished views. Errors: as `finish`.
+struct FrameRatio {
+  double value;
+  std::string note;
+};
+Result<FrameRatio> frame_ratio(Scene& a, Scene& b, const view::Camera& camera, bool quick);
+
 /// Degrees and metres above the ellipsoid.
 view::Pose pose_at(double latitude, double longitude, double height, double heading, double pitch, double roll = 0.0);
 /// As --camera takes it.
