@@ -35,7 +35,8 @@ void print_statistics(const globe::LayerInfo& layer, bool exact) {
     fmt::print("  {:<11} {:.6g} .. {:.6g}{}, mean {:.6g}, standard deviation {:.6g}\n", is_height ? "samples" : statistics->bands.size() > 1 ? kColours[i] : "grey",
                band.least, band.largest, is_height ? " m" : "", band.mean, band.deviation);
   }
-  const std::string of_level = statistics->level == 0 ? "" : fmt::format(" (all of this of level {}; --exact reads level 0)", statistics->level);
+  const bool is_remote = layer.raster->description().is_remote;
+  const std::string of_level = statistics->level == 0 ? "" : fmt::format(" (all of this of level {}{})", statistics->level, is_remote ? "" : "; --exact reads level 0");
   fmt::print("  there       {:.4g} % of the samples{}\n", 100.0 * statistics->share_there, of_level);
 }
 
@@ -51,7 +52,7 @@ void print_raster(const source::RasterDescription& raster) {
   fmt::print("  ellipsoid   {:.3f} x {:.3f} m\n", raster.ellipsoid.a(), raster.ellipsoid.b());
   fmt::print("  latitudes   {} .. {}\n", angle(raster.bounds.south), angle(raster.bounds.north));
   fmt::print("  longitudes  {} .. {}{}\n", angle(raster.bounds.west), angle(raster.bounds.east),
-             raster.wraps ? " (all round)" : "");
+             raster.bounds.east.value - raster.bounds.west.value > 2.0 * std::numbers::pi - 1e-3 ? " (all round)" : "");
   fmt::print("  spacing     {:.3f} m\n", raster.spacing.value);
   if (!raster.attribution.empty()) fmt::print("  credit      {}\n", raster.attribution);
   if (raster.kind == source::SampleKind::height)

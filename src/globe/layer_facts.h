@@ -27,10 +27,10 @@ std::optional<CatalogueFacts> catalogue_facts(const Globe& globe, std::size_t la
 /// A world that also shows where layers lie.
 struct ShownFootprints {
   World world;
-  std::optional<geo::LatLon> middle;  ///< of the last raster that does not go round the globe, or of any
+  std::optional<geo::LatLon> middle;  ///< of the last raster that does not go round the globe or the last catalogue, or of any
 };
 
-/// Adds an overlay for each raster of the layers of `told` that does not go round the globe.
+/// Adds an overlay for each layer of `told`, but for rasters that go round the globe.
 Result<ShownFootprints> with_footprints(World world, const Globe& told);
 
 }  // namespace tellurion::globe

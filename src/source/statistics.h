@@ -19,11 +19,14 @@ struct BandStatistics {
 
 struct RasterStatistics {
   int level = 0;                     ///< whose samples they are
-  double share_there = 0;            ///< of the samples: all but no-data, and the transparent ones of a picture
+  double share_there = 0;            ///< of the samples within the bounds: all but no-data, and the transparent ones of a picture
   std::vector<BandStatistics> bands; ///< metres above the world's ellipsoid; or red, green, blue from 0 to 255; or grey alone
 };
 
-/// Reads the finest level of at most `most_samples`, or the coarsest. Errors: those of reading; unsupported (a raster on a server).
+inline constexpr double kMostRemoteSamples = 1 << 20;  ///< of a raster on a server: sixteen tiles of 256 x 256
+
+/// Reads the finest level of at most `most_samples` within the bounds, or the coarsest. What is on a server is waited for.
+/// Errors: those of reading; unavailable (the server is too slow).
 Result<RasterStatistics> statistics_of(const RasterSource& source, double most_samples);
 
 }  // namespace tellurion::source

@@ -12,6 +12,7 @@
 #include "fetch/little_server.h"
 #include "source/gdal/gdal_source.h"
 #include "source/made_raster.h"
+#include "source/statistics.h"
 
 using namespace tellurion;
 using namespace tellurion::source;
@@ -249,6 +250,37 @@ TEST_CASE("open_cog: a part that cannot be had is an error, and is there once th
   const auto well = settled(**reader, rounds, [&] { return (*reader)->read_heights(0, window); });
   REQUIRE(well);
   CHECK(well->at(0, 0) == static_cast<float>(large_raster({}).values[0][256 * 700 + 256]));
+}
+
+TEST_CASE("statistics_of: of a remote file as of the same on disk, of a level of a million samples at most; a server without an answer is told of") {
+  MadeRaster raster = large_raster({"TILED=YES"});
+  raster.width = 1400;
+  raster.height = 1200;
+  raster.values = {test::ramp(1400 * 1200, -4000, 1.0 / 128)};
+  const MadeFile file("cog_statistics.tif", raster);
+  RangeServer server(bytes_of(file.path()));
+  GdalOptions options;
+  options.path = file.path();
+  options.vertical = "ellipsoid";
+  const auto local = open_gdal(options, geo::kWgs84);
+  REQUIRE(local);
+  options.path = server.url();
+  const auto remote = open_cog(options, {}, geo::kWgs84, store());
+  REQUIRE(remote);
+  const auto wanted = statistics_of(**local, kMostRemoteSamples), found = statistics_of(**remote, 1e9);
+  REQUIRE(wanted);
+  REQUIRE_MESSAGE(found, (found ? "" : found.error().message));
+  CHECK(wanted->level == 1);
+  CHECK(found->level == 1);
+  CHECK(found->share_there == wanted->share_there);
+  CHECK(found->bands[0].mean == wanted->bands[0].mean);
+  CHECK(found->bands[0].deviation == wanted->bands[0].deviation);
+  const auto again = open_cog(options, {}, geo::kWgs84, store());
+  REQUIRE(again);
+  server.broken_ = true;
+  const auto failed = statistics_of(**again, 1e9);
+  REQUIRE_FALSE(failed);
+  CHECK(failed.error().code == ErrorCode::unavailable);
 }
 
 TEST_CASE("open_cog: what proves damaged is not kept") {

@@ -1,5 +1,7 @@
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include <GeographicLib/Ellipsoid.hpp>
 #include <doctest/doctest.h>
@@ -251,6 +253,42 @@ TEST_CASE("footprint: tints the raster's ground in its own projection, with a li
   const Opened small = opened(open_footprint(std::shared_ptr<const RasterSource>(*open_gdal(options, geo::kWgs84)), geo::kWgs84));
   CHECK(ink(small, 50.0 + 0.08 * 180.0 / std::numbers::pi, 10.0) == 255);
   CHECK(ink(small, 51.0, 10.0) == 0);
+}
+
+TEST_CASE("footprints: every raster of a catalogue is tinted, with lines where one begins or ends; what goes round the globe is not") {
+  const auto made = [](double south, double west, double north, double east) {
+    const double corners[4][2] = {{north, west}, {north, east}, {south, east}, {south, west}};
+    std::vector<geo::LatLon> ring;
+    for (int i = 0; i < 4 * kRingSteps; ++i) {
+      const double* a = corners[i / kRingSteps];
+      const double* b = corners[(i / kRingSteps + 1) % 4];
+      const double t = static_cast<double>(i % kRingSteps) / kRingSteps;
+      ring.push_back({to_radians(Degrees(std::lerp(a[0], b[0], t))), to_radians(Degrees(std::lerp(a[1], b[1], t)))});
+    }
+    return Footprint(ring, Metres(1000), geo::kWgs84);
+  };
+  Catalogue::Sets sets;
+  for (const auto& [south, west, north, east] : {std::array{-89.0, -179.9, 89.0, 179.9}, {10.0, 20.0, 14.0, 26.0}, {12.0, 23.0, 16.0, 29.0}})
+    sets.push_back(std::make_shared<const DataSet>(DataSet{static_cast<std::uint32_t>(sets.size()), "", 0, made(south, west, north, east)}));
+  const auto catalogue = std::make_shared<const Catalogue>(std::move(sets), CatalogueOrder::finest, nullptr);
+  const Opened drawn = opened(open_footprints(catalogue, "two", geo::kWgs84));
+  const auto inks = [&](double latitude, double longitude, int width) {  // of pixels 0.011 degrees wide
+    const glm::dvec2 at = pixel_of(*drawn.reader, latitude, longitude);
+    const auto pixels = drawn.reader->read_colours(0, {static_cast<int>(at.x) - width / 2, static_cast<int>(at.y), width, 1});
+    REQUIRE(pixels);
+    std::set<int> found;
+    for (int x = 0; x < width; ++x) found.insert(pixels->at(x, 0)[3]);
+    return found;
+  };
+  using Found = std::set<int>;
+  CHECK(inks(13.0, 21.0, 1) == Found{80});
+  CHECK(inks(13.0, 24.5, 1) == Found{80});
+  CHECK(inks(15.0, 28.0, 1) == Found{80});
+  CHECK(inks(15.0, 21.0, 1) == Found{0});
+  CHECK(inks(-50.0, 100.0, 1) == Found{0});
+  CHECK(inks(11.0, 20.0, 21) == Found{0, 80, 255});  // the border of the first
+  CHECK(inks(13.0, 23.0, 21) == Found{80, 255});     // that of the second over the first
+  CHECK(inks(13.0, 22.0, 21) == Found{80});
 }
 
 TEST_CASE("debug sources: what cannot be is refused") {
