@@ -10,6 +10,7 @@ uniform sampler2DArray u_slope;
 uniform sampler2DArray u_before;
 uniform sampler2DArray u_effects;
 uniform sampler2DArray u_overlay;
+uniform sampler2DArray u_normals;
 uniform vec4 u_tile[9];
 
 in vec4 v_uv;
@@ -29,6 +30,9 @@ in vec4 v_ambient;
 #ifdef EFFECTS
 in vec4 v_eye;
 #endif
+#ifdef NORMALS
+in vec3 v_up;
+#endif
 #elif defined(ATMOSPHERE)
 in vec3 v_air_light;
 in vec3 v_air_through;
@@ -46,6 +50,19 @@ vec3 level_colour(float level) {
   float hue = fract(level * 0.381966 + 0.55);
   return clamp(abs(fract(hue + vec3(0.0, 2.0 / 3.0, 1.0 / 3.0)) * 6.0 - 3.0) - 1.0, 0.0, 1.0) * 0.85 + 0.15;
 }
+
+#ifdef NORMALS
+// Along the slope map's tangents, of a normal in the frame of east, north and up; see surface::ImageUse.
+vec2 slope_of_normal(vec3 encoded) {
+  vec3 normal = 2.0 * encoded - 1.0;
+  vec2 rise = -normal.xy / max(normal.z, 0.02);  // to the east, to the north
+  vec3 up = normalize(v_up);
+  vec3 east = vec3(-up.y, up.x, 0.0) * inversesqrt(max(dot(up.xy, up.xy), 1e-12));
+  vec3 along = rise.x * east + rise.y * cross(up, east);
+  vec3 tangent_u = normalize(u_tile[3].xyz - up * dot(u_tile[3].xyz, up));
+  return vec2(dot(along, tangent_u), dot(along, cross(tangent_u, up)));
+}
+#endif
 
 void main() {
 #ifdef LOG_DEPTH
@@ -70,6 +87,10 @@ void main() {
   colour *= colour;  // sRGB's curve, nearly
 #ifdef LIGHT
   vec2 slope = sun.w * texture(u_slope, vec3(v_uv.zw, u_tile[5].w)).rg;
+#ifdef NORMALS
+  vec4 normals = texture(u_normals, vec3(v_uv.xy, u_tile[8].y), kSharpness);
+  slope = mix(slope, sun.w * slope_of_normal(normals.rgb / max(normals.a, 1.0 / 255.0)), normals.a);
+#endif
   float facing = (v_sun.z - dot(slope, v_sun.xy)) * inversesqrt(1.0 + dot(slope, slope));
   colour *= v_ambient.rgb + v_sunlight.rgb * max(facing, 0.0);
 #ifdef EFFECTS

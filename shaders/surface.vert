@@ -9,7 +9,7 @@ layout(location = 4) in float a_skirt;
 // 2: normal at the origin; skirt depth            3: tangent of the slope map; level
 // 4: colour slot's scale, offset, layer           5: slope slot's likewise
 // 6: the slot that it fades from, likewise        7: fade; sink depth, sink level; layer of the effects
-// 8: layer of the overlay
+// 8: layer of the overlay; layer of the normals
 uniform vec4 u_tile[9];
 
 // Few and full: a software rasteriser pays for every one of a triangle.
@@ -30,6 +30,9 @@ out vec4 v_sunlight;
 out vec4 v_ambient;
 #ifdef EFFECTS
 out vec4 v_eye;           // direction to the eye likewise; share of the night's own light
+#endif
+#ifdef NORMALS
+out vec3 v_up;
 #endif
 #elif defined(ATMOSPHERE)
 out vec3 v_air_light;
@@ -99,6 +102,9 @@ void main() {
   v_sun = vec4(to_sun, air_light.r);
   v_sunlight = vec4(sunlight * air_through, air_light.g);
   v_ambient = vec4(ambient * air_through, air_light.b);
+#ifdef NORMALS
+  v_up = up;
+#endif
 #ifdef EFFECTS
   float night = 1.0 - smoothstep(-0.2, 0.02, to_sun.z);
   v_eye = vec4(-dot(relative, tangent_u), -dot(relative, tangent_v), -dot(relative, up), night * air_through.g);

@@ -51,6 +51,7 @@ bool settings_rows(globe::LayerSettings& settings, globe::LayerGroup group) {
     return ImGui::SliderScalar(name, ImGuiDataType_Double, &value, &least, &most, "%.2f", flags | ImGuiSliderFlags_AlwaysClamp);
   };
   bool changed = slider("opacity", settings.opacity, 0.0, 1.0);
+  if (group == globe::LayerGroup::normal) return changed;
   changed |= slider("gamma", settings.gamma, 0.1, 10.0, ImGuiSliderFlags_Logarithmic);
   changed |= slider("multiplier", settings.multiplier, 0.0, 4.0);
   return changed;

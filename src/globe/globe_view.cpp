@@ -170,7 +170,8 @@ void GlobeView::State::show_surface_at(const ViewSettings& settings) {
   slots.layers_changed(*surface, *latest);
   tree.forget_failures(Part::colour);
   surface = std::move(latest);
-  if (std::ranges::find(surface->colours, surface::ImageUse::overlay, &surface::Layer::use) != surface->colours.end()) renderer->allow_overlays(thread);
+  const auto shows = [&](surface::ImageUse use) { return std::ranges::find(surface->colours, use, &surface::Layer::use) != surface->colours.end(); };
+  renderer->allow(thread, {.overlays = shows(surface::ImageUse::overlay), .normals = shows(surface::ImageUse::normal)});
   std::erase_if(waiting, [&](const WaitingPart& part) {
     if (part.part != Part::colour) return false;
     tree.cancelled(part.key, part.part);
@@ -496,7 +497,11 @@ Result<std::unique_ptr<GlobeView>> GlobeView::create(Globe& globe, gpu::RenderTh
   render::RendererOptions options;
   options.ellipsoid = globe.ellipsoid();
   options.gpu_budget_bytes = gpu_budget_bytes;
-  for (std::size_t i = 0; i < globe.layer_count(); ++i) options.overlays = options.overlays || globe.layer(i).spec.group == LayerGroup::overlay;
+  for (std::size_t i = 0; i < globe.layer_count(); ++i) {
+    const LayerGroup group = globe.layer(i).spec.group;
+    options.slots.overlays = options.slots.overlays || group == LayerGroup::overlay;
+    options.slots.normals = options.slots.normals || group == LayerGroup::normal;
+  }
   auto renderer = render::Renderer::create(thread, options);
   if (!renderer) return renderer.error();
   state->renderer = std::move(*renderer);

@@ -107,10 +107,8 @@ source::ServiceOptions service_options(const LayerSpec& layer) {
   return options;
 }
 
-}  // namespace
-
-Result<std::unique_ptr<source::RasterSource>> open_layer_source(const LayerSpec& spec, const geo::Ellipsoid& world, const std::filesystem::path& cache_folder,
-                                                                const std::function<std::shared_ptr<fetch::ByteStore>()>& needed_store) {
+Result<std::unique_ptr<source::RasterSource>> open_any(const LayerSpec& spec, const geo::Ellipsoid& world, const std::filesystem::path& cache_folder,
+                                                       const std::function<std::shared_ptr<fetch::ByteStore>()>& needed_store) {
   const std::string& type = spec.source.type;
   if (type == "xyz") return source::open_tiles(tile_service(spec), world, needed_store());
   if (type == "cesium-terrain") {
@@ -133,6 +131,18 @@ Result<std::unique_ptr<source::RasterSource>> open_layer_source(const LayerSpec&
   }
   if (!cache_folder.empty()) how.unpack_folder = (cache_folder / "unpacked").string();
   return source::open_gdal(how, world);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<source::RasterSource>> open_layer_source(const LayerSpec& spec, const geo::Ellipsoid& world, const std::filesystem::path& cache_folder,
+                                                                const std::function<std::shared_ptr<fetch::ByteStore>()>& needed_store) {
+  auto opened = open_any(spec, world, cache_folder, needed_store);
+  if (!opened || spec.group != LayerGroup::normal) return opened;
+  const source::RasterDescription& about = (*opened)->description();
+  if (about.band_count >= 3 && about.sample_type == "Byte") return opened;
+  return Error{ErrorCode::invalid_argument, fmt::format("{}: has {} band{} of {}; normals are three of Byte: (n + 1) / 2 * 255 to the east, to the north and up", about.name,
+                                                        about.band_count, about.band_count == 1 ? "" : "s", about.sample_type)};
 }
 
 }  // namespace tellurion::globe

@@ -25,6 +25,7 @@ surface::ImageUse use_of(LayerGroup group) {
     case LayerGroup::water: return surface::ImageUse::water;
     case LayerGroup::night: return surface::ImageUse::night;
     case LayerGroup::overlay: return surface::ImageUse::overlay;
+    case LayerGroup::normal: return surface::ImageUse::normal;
     case LayerGroup::height:
     case LayerGroup::color:
     case LayerGroup::grayscale_overlay: break;

@@ -18,7 +18,7 @@
 namespace tellurion::globe {
 namespace {
 
-constexpr std::string_view kGroupNames[] = {"height", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
+constexpr std::string_view kGroupNames[] = {"height", "normal", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
 
 /// Sources that need neither file nor server.
 bool is_drawn_by_itself(const std::string& type) { return type == "tile-index" || type == "scale"; }
@@ -89,6 +89,9 @@ class WorldReader {
     layer.opacity = number(table, "opacity", 0.0, 1.0).value_or(1.0);
     layer.gamma = number(table, "gamma", kLeastGamma, kMostGamma).value_or(1.0);
     layer.multiplier = number(table, "multiplier", -kMostMultiplier, kMostMultiplier).value_or(1.0);
+    for (const char* key : {"gamma", "multiplier"}) {
+      if (const toml::node* node = table.get(key); node && layer.group == LayerGroup::normal) fail(*node, fmt::format("normals have no `{}`: they are directions", key));
+    }
     layer.enabled = flag(table, "enabled").value_or(true);
     layer.attribution = text(table, "attribution").value_or("");
     if (const auto mode = text(table, "mode")) {
@@ -427,6 +430,8 @@ Result<void> check(const LayerSettings& settings, LayerGroup group) {
   if (auto fine = out_of_range("opacity", settings.opacity, 0.0, 1.0); !fine) return fine;
   if (auto fine = out_of_range("gamma", settings.gamma, kLeastGamma, kMostGamma); !fine) return fine;
   if (auto fine = out_of_range("multiplier", settings.multiplier, -kMostMultiplier, kMostMultiplier); !fine) return fine;
+  if (group == LayerGroup::normal && (settings.gamma != 1.0 || settings.multiplier != 1.0))
+    return {ErrorCode::invalid_argument, "normals have no `gamma` and no `multiplier`: they are directions"};
   if (settings.adds && group != LayerGroup::height) return {ErrorCode::invalid_argument, "only heights are added to those below"};
   return {};
 }

@@ -22,7 +22,7 @@ class RasterSource;
 namespace tellurion::globe {
 
 /// The groups in the order in which they are drawn.
-enum class LayerGroup { height, color, grayscale, grayscale_overlay, water, night, overlay };
+enum class LayerGroup { height, normal, color, grayscale, grayscale_overlay, water, night, overlay };
 
 /// The group's name in world files.
 std::string_view name_of(LayerGroup group);

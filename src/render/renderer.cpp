@@ -23,7 +23,7 @@ constexpr int kSamples = 4;
 std::uint32_t features_of(const FrameLook& look, const RendererOptions& options, bool reversed) {
   return (look.lighting ? SurfacePass::light : 0u) | (look.atmosphere && options.air ? SurfacePass::atmosphere : 0u) |
          (look.tile_borders ? SurfacePass::borders : 0u) | (reversed ? 0u : SurfacePass::log_depth) |
-         (options.overlays ? SurfacePass::overlay : 0u);
+         (options.slots.overlays ? SurfacePass::overlay : 0u) | (options.slots.normals ? SurfacePass::normals : 0u);
 }
 
 /// What of a look drivers compile for.
@@ -52,7 +52,7 @@ surface::TileGeometry triangle_before(const view::Camera& camera) {
 }
 
 /// Of one texel.
-surface::TileImagery imagery_of_a_texel(bool has_effects, bool has_overlay) {
+surface::TileImagery imagery_of_a_texel(bool has_effects, bool has_overlay, bool has_normals) {
   surface::ImagePatch patch;
   patch.image = {1, 1, {255, 255, 255, 255}};
   patch.columns = patch.rows = 1;
@@ -61,6 +61,8 @@ surface::TileImagery imagery_of_a_texel(bool has_effects, bool has_overlay) {
   imagery.patches = {patch};
   patch.use = surface::ImageUse::overlay;
   if (has_overlay) imagery.overlays = {patch};
+  patch.use = surface::ImageUse::normal;
+  if (has_normals) imagery.normals = {patch};
   patch.use = surface::ImageUse::night;
   if (has_effects) imagery.effects = {std::move(patch)};
   return imagery;
@@ -72,7 +74,7 @@ struct Renderer::State {
   State(gpu::RenderThread& thread, const RendererOptions& asked, Compositor compositor, SkyPass sky_pass)
       : options(asked),
         store(thread, asked.gpu_budget_bytes, std::move(compositor)),
-        surface(thread),
+        surface(thread, asked.ellipsoid),
         sky(std::move(sky_pass)),
         frame_buffer(thread),
         smooth(GL_RGBA8, std::min(kSamples, thread.capabilities().max_samples)) {
@@ -221,9 +223,10 @@ FrameFigures Renderer::State::draw_plain(gpu::RenderThread& thread, const view::
   return figures;
 }
 
-void Renderer::allow_overlays(gpu::RenderThread& thread) {
+void Renderer::allow(gpu::RenderThread& thread, const OptionalSlots& slots) {
   thread.check();
-  state_->options.overlays = true;
+  OptionalSlots& allowed = state_->options.slots;
+  allowed = {allowed.overlays || slots.overlays, allowed.normals || slots.normals};
 }
 
 bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
@@ -238,12 +241,14 @@ bool Renderer::warm_up(gpu::RenderThread& thread, const FrameLook& look) {
   camera.width = camera.height = 16;
   camera.eye = {{2.0 * s.options.ellipsoid.a(), 0.0, 0.0}};
   std::vector<DrawTile> tiles;
-  for (std::uint8_t i = 0; i < (s.options.overlays ? 4 : 2); ++i) {
+  for (std::uint8_t i = 0; i < 8; ++i) {
+    const bool has_effects = (i & 1) != 0, has_overlay = (i & 2) != 0, has_normals = (i & 4) != 0;
+    if ((has_overlay && !s.options.slots.overlays) || (has_normals && !s.options.slots.normals)) continue;
     const geo::TileKey key{.face = static_cast<std::uint8_t>(geo::kFaceCount + i)};  // no tile of the planet
     if (!s.store.upload_geometry(thread, key, triangle_before(camera))) break;
     DrawTile tile{.key = key, .colour_owner = key, .colour_before = key, .slope_owner = key};
     tiles.push_back(tile);
-    if (!s.store.upload_colour(thread, key, imagery_of_a_texel((i & 1) != 0, (i & 2) != 0))) break;
+    if (!s.store.upload_colour(thread, key, imagery_of_a_texel(has_effects, has_overlay, has_normals))) break;
     tile.colour_before.face = 0;
     tile.fade = 0.5f;
     tiles.push_back(tile);

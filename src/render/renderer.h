@@ -32,11 +32,17 @@ struct Air {
   double brightness = 15.0;                               ///< of the scattered light, 1 leaving a pixel at 1 - 1/e
 };
 
+/// What tiles may have beside colours.
+struct OptionalSlots {
+  bool overlays = false;
+  bool normals = false;
+};
+
 struct RendererOptions {
   geo::Ellipsoid ellipsoid;
   std::optional<Air> air = Air{};                         ///< nothing: FrameLook::atmosphere has no effect
   std::size_t gpu_budget_bytes = std::size_t{512} << 20;  ///< slots, meshes and targets together
-  bool overlays = false;                                  ///< whether tiles may have overlays
+  OptionalSlots slots{};
 };
 
 /// How a frame looks. All of it may change from frame to frame without a stall.
@@ -83,8 +89,8 @@ class Renderer {
   std::uint64_t bytes_uploaded() const;      ///< since creation
   std::size_t colour_slots_free() const;
 
-  /// From now on tiles may have overlays; the next frame may have to compile for that.
-  void allow_overlays(gpu::RenderThread& thread);
+  /// From now on tiles may have these too; the next frame may have to compile for that.
+  void allow(gpu::RenderThread& thread, const OptionalSlots& slots);
 
   /// Compiles what `look` needs, so that the first frame with it does not stall; false if that was done before.
   bool warm_up(gpu::RenderThread& thread, const FrameLook& look);

@@ -9,6 +9,7 @@
 #include <epoxy/gl.h>
 
 #include "render/pass_source.h"
+#include "surface/tile_grid.h"
 
 namespace tellurion::render {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 using surface::DrawTile;
 
 /// What a tile adds to the features of all; bits of a variant's index.
-enum TileVariant : std::uint32_t { kFades = 1, kShines = 2, kOverlaid = 4 };
+enum TileVariant : std::uint32_t { kFades = 1, kShines = 2, kOverlaid = 4, kInclined = 8 };
 
 constexpr int kTileVectors = 9;  // u_tile of shaders/surface.vert
 
@@ -81,6 +82,12 @@ bool shows_effects(const ResidentTile& owner, const glm::dvec3& up, int level, c
   return glm::dot(half_way, up) > length * std::cos(std::min(kGlintEnds + reach + turn, 3.14));
 }
 
+/// Whether the normals of the tile `owner` are finer than the slopes of a tile of `slope_level`, whose texels measure half to one of the
+/// elevation's spacings.
+bool shows_normals(const ResidentTile& owner, int slope_level, const geo::Ellipsoid& ellipsoid) {
+  return owner.normals && owner.normals_spacing < 2.0 * surface::nominal_slope_texel(ellipsoid, slope_level);
+}
+
 struct TileUniforms {
   glm::vec4 v[kTileVectors];
 };
@@ -88,9 +95,9 @@ struct TileUniforms {
 gpu::ProgramSource surface_source() {
   return {shader_texts({"frame.glsl", "atmosphere.glsl", "surface.vert"}),
           shader_texts({"frame.glsl", "surface.frag"}),
-          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH", "EFFECTS", "OVERLAY"},
+          {"LIGHT", "ATMOSPHERE", "FADE", "BORDERS", "WIREFRAME", "MEASURE", "LOG_DEPTH", "EFFECTS", "OVERLAY", "NORMALS"},
           {"u_tile"},
-          {"u_colour", "u_slope", "u_before", "u_effects", "u_overlay"},
+          {"u_colour", "u_slope", "u_before", "u_effects", "u_overlay", "u_normals"},
           {"Frame"}};
 }
 
@@ -100,8 +107,9 @@ gpu::ProgramSource box_source() {
 
 }  // namespace
 
-SurfacePass::SurfacePass(gpu::RenderThread& thread)
-    : programs_(surface_source()),
+SurfacePass::SurfacePass(gpu::RenderThread& thread, const geo::Ellipsoid& ellipsoid)
+    : ellipsoid_(ellipsoid),
+      programs_(surface_source()),
       box_programs_(box_source()),
       box_array_(thread),
       box_edges_(thread),
@@ -124,13 +132,14 @@ Result<void> SurfacePass::prepare(gpu::RenderThread& thread, std::uint32_t featu
   return {};
 }
 
-Result<std::array<const gpu::LinkedProgram*, 8>> SurfacePass::variants(gpu::RenderThread& thread, std::uint32_t features) {
+Result<SurfacePass::Variants> SurfacePass::variants(gpu::RenderThread& thread, std::uint32_t features) {
   const bool coloured = !(features & (measure | wireframe)), overlaid = coloured && (features & overlay);
-  const bool shines = coloured && (features & light);  // effects matter to light only
-  std::array<const gpu::LinkedProgram*, 8> programs{};
+  const bool shines = coloured && (features & light), inclined = shines && (features & normals);  // effects and normals matter to light only
+  Variants programs{};
   for (std::uint32_t i = 0; i < programs.size(); ++i) {
-    const std::uint32_t added = (coloured && (i & kFades) ? fade : 0u) | (shines && (i & kShines) ? effects : 0u) | (overlaid && (i & kOverlaid) ? overlay : 0u);
-    const auto program = programs_.variant(thread, (features & ~overlay) | added);
+    const std::uint32_t added = (coloured && (i & kFades) ? fade : 0u) | (shines && (i & kShines) ? effects : 0u) | (overlaid && (i & kOverlaid) ? overlay : 0u) |
+                                (inclined && (i & kInclined) ? normals : 0u);
+    const auto program = programs_.variant(thread, (features & ~(overlay | normals)) | added);
     if (!program) return program.error();
     programs[i] = *program;
   }
@@ -159,7 +168,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
   if (!programs) return {};
 
   glBindSampler(1, 0);
-  for (const unsigned unit : {0u, 2u, 3u, 4u}) glBindSampler(unit, colour_sampler_.name());
+  for (const unsigned unit : {0u, 2u, 3u, 4u, 5u}) glBindSampler(unit, colour_sampler_.name());
   std::fill(std::begin(bound_), std::end(bound_), 0u);
 
   FrameFigures figures;
@@ -176,8 +185,10 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     const glm::dvec3 offset = mesh.origin(exaggeration) - camera.eye.xyz;
     const bool has_effects = colour_owner && shows_effects(*colour_owner, mesh.origin_up(), tile.key.level, offset, to_sun);
     const bool has_overlay = colour_owner && colour_owner->overlay;
+    const bool has_normals = colour_owner && shows_normals(*colour_owner, tile.slope_owner.level, ellipsoid_);
     const gpu::LinkedProgram* program =
-        (*programs)[(fades || renews ? kFades : 0u) + (has_effects ? kShines : 0u) + (has_overlay ? kOverlaid : 0u)];
+        (*programs)[(fades || renews ? kFades : 0u) + (has_effects ? kShines : 0u) + (has_overlay ? kOverlaid : 0u) +
+                     (has_normals ? kInclined : 0u)];
     if (program != in_use) {
       glUseProgram(program->program.name());
       in_use = program;
@@ -208,6 +219,11 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
       u.v[8].x = layer.layer;
       bind(4, layer.texture);
     }
+    if (has_normals) {
+      const auto layer = store.normals_of(*colour_owner);
+      u.v[8].y = layer.layer;
+      bind(5, layer.texture);
+    }
     bind(0, colour.texture);
     bind(1, slopes.texture);
     if (fades || renews) {
@@ -229,7 +245,7 @@ FrameFigures SurfacePass::draw(gpu::RenderThread& thread, const view::Camera& ca
     ++figures.draws;
   }
   glBindVertexArray(0);
-  for (GLuint unit = 0; unit < 5; ++unit) glBindSampler(unit, 0);
+  for (GLuint unit = 0; unit < 6; ++unit) glBindSampler(unit, 0);
   return figures;
 }
 

@@ -143,9 +143,10 @@ Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::Tile
     slots.colour = known->second.colour;
     slots.effects = known->second.effects;
     slots.overlay = known->second.overlay;
+    slots.normals = known->second.normals;
   }
   const std::array wanted{std::pair(&ResidentTile::colour, true), std::pair(&ResidentTile::effects, !imagery.effects.empty()),
-                          std::pair(&ResidentTile::overlay, !imagery.overlays.empty())};
+                          std::pair(&ResidentTile::overlay, !imagery.overlays.empty()), std::pair(&ResidentTile::normals, !imagery.normals.empty())};
   std::vector<std::optional<Slot>*> fresh;
   for (const auto& [slot, is_wanted] : wanted) {
     if (!is_wanted || slots.*slot) continue;
@@ -173,10 +174,12 @@ Result<void> TileStore::upload_colour(gpu::RenderThread& thread, const geo::Tile
   const auto has = [&](surface::ImageUse use) { return std::ranges::find(imagery.effects, use, &surface::ImagePatch::use) != imagery.effects.end(); };
   tile.has_night = has(surface::ImageUse::night);
   tile.has_water = has(surface::ImageUse::water);
+  tile.normals_spacing = imagery.normals_spacing;
   bytes_uploaded_ += imagery.bytes();
   auto composed = compositor_.compose(thread, imagery.patches, colours_, *tile.colour, budget_);
   if (composed && tile.effects) composed = compositor_.compose_effects(thread, imagery.effects, colours_, *tile.effects, budget_);
   if (composed && tile.overlay) composed = compositor_.compose(thread, imagery.overlays, colours_, *tile.overlay, budget_);
+  if (composed && tile.normals) composed = compositor_.compose(thread, imagery.normals, colours_, *tile.normals, budget_);
   if (!composed) release(key, surface::Part::colour);
   return composed;
 }
@@ -202,7 +205,7 @@ void TileStore::release(const geo::TileKey& key, surface::Part part) {
     if (tile.slopes) slopes_.release(*tile.slopes);
     tile.slopes.reset();
   } else {
-    for (auto* slot : {&tile.colour, &tile.colour_before, &tile.effects, &tile.overlay}) release_colour(*slot);
+    for (auto* slot : {&tile.colour, &tile.colour_before, &tile.effects, &tile.overlay, &tile.normals}) release_colour(*slot);
   }
   if (!tile.mesh && !tile.colour) tiles_.erase(found);
 }

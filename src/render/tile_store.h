@@ -25,6 +25,8 @@ struct ResidentTile {
   float renewal = 1.0f;               ///< share of `colour` over it
   std::optional<Slot> effects;        ///< light by night (red, green, blue) and share of water (alpha), where `colour` is
   std::optional<Slot> overlay;        ///< what lies over light and air, likewise
+  std::optional<Slot> normals;        ///< likewise
+  float normals_spacing = 0;          ///< metres between the finest of them
   bool has_night = false;             ///< the one of the effects is not dark all over
   bool has_water = false;
 };
@@ -61,6 +63,7 @@ class TileStore {
   /// Of a tile that has such a slot.
   Layer effects_of(const ResidentTile& tile) const { return layer_of(*tile.effects); }
   Layer overlay_of(const ResidentTile& tile) const { return layer_of(*tile.overlay); }
+  Layer normals_of(const ResidentTile& tile) const { return layer_of(*tile.normals); }
   Layer slopes_of(const ResidentTile* tile) const;
 
   Budget& budget() { return budget_; }

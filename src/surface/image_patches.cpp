@@ -15,6 +15,7 @@
 #include <glm/vector_relational.hpp>
 
 #include "surface/control_grid.h"
+#include "surface/error_scan.h"
 #include "surface/tile_grid.h"
 
 namespace tellurion::surface {
@@ -152,9 +153,10 @@ std::vector<ImagePatch>& list_of(ImageUse use, TileImagery& imagery) {
     case ImageUse::grayscale: return imagery.patches;
     case ImageUse::night:
     case ImageUse::water: return imagery.effects;
-    case ImageUse::overlay: break;
+    case ImageUse::overlay: return imagery.overlays;
+    case ImageUse::normal: break;
   }
-  return imagery.overlays;
+  return imagery.normals;
 }
 
 /// Leaves out the patches of a use all of which are dark.
@@ -333,12 +335,18 @@ namespace {
 /// A tile's imagery while it is made, from the uppermost layer down.
 class Composition {
  public:
-  Composition(const geo::Ellipsoid& world, const geo::TileKey& key, std::stop_token stop) : world_(world), key_(key), stop_(std::move(stop)) {}
+  Composition(const SurfaceDescription& description, const geo::TileKey& key, std::stop_token stop)
+      : description_(description), world_(description.ellipsoid), key_(key), stop_(std::move(stop)) {}
 
   bool is_hidden(ImageUse use) const { return hidden(use) || (use == ImageUse::grayscale && hidden(ImageUse::colour)); }
 
-  /// Errors: cancelled. What cannot be read is left out.
+  /// Errors: cancelled. What cannot be read is left out, and so are normals that are no finer than those of the elevation.
   Result<void> add(const Layer& settings, std::uint32_t source_id, cache::CachedRaster& raster) {
+    if (settings.use == ImageUse::normal) {
+      const double spacing = std::max(raster.description().spacing.value, nominal_colour_texel(world_, key_.level));
+      if (spacing >= slope_spacing()) return {};
+      normals_spacing_ = normals_spacing_ > 0.0 ? std::min(normals_spacing_, spacing) : spacing;
+    }
     source::RasterReader& reader = raster.reader();
     const SlotMapping mapping = map_slot(world_, key_, raster.description(), reader);
     const Extent extent = extent_of(raster.description(), reader);
@@ -378,7 +386,8 @@ class Composition {
     TileImagery imagery;
     for (ImagePatch& patch : std::views::reverse(from_the_top_)) list_of(patch.use, imagery).push_back(std::move(patch));
     drop_dark(imagery.effects);
-    std::erase_if(imagery.overlays, [](const ImagePatch& patch) { return is_clear(patch.image); });
+    for (auto* list : {&imagery.overlays, &imagery.normals}) std::erase_if(*list, [](const ImagePatch& patch) { return is_clear(patch.image); });
+    imagery.normals_spacing = static_cast<float>(normals_spacing_);
     imagery.missing = std::move(missing_);
     return imagery;
   }
@@ -386,12 +395,19 @@ class Composition {
  private:
   bool hidden(ImageUse use) const { return hidden_[static_cast<std::size_t>(use)]; }
 
+  /// Metres between the slopes that the elevation can give under the tile, at the tile's own detail.
+  double slope_spacing() const {
+    return std::max(finest_spacing(description_.heights, key_), nominal_slope_texel(world_, key_.level));
+  }
+
+  const SurfaceDescription& description_;
   const geo::Ellipsoid& world_;
   geo::TileKey key_;
   std::stop_token stop_;
   std::vector<ImagePatch> from_the_top_;
   std::vector<MissingLayer> missing_;
   std::array<bool, kImageUses> hidden_{};  ///< what lies further down, of each use
+  double normals_spacing_ = 0.0;  ///< of the finest normals; 0: there are none
   bool pending_ = false;
 };
 
@@ -406,7 +422,7 @@ source::FaceRegion slot_region(const geo::TileKey& key) {
 
 Result<TileImagery> build_imagery(ColourModel& model, const geo::TileKey& key, std::stop_token stop) {
   const geo::Ellipsoid& world = model.description().ellipsoid;
-  Composition composition(world, key, std::move(stop));
+  Composition composition(model.description(), key, std::move(stop));
   const Radians narrowest(kNarrowestDataSet * nominal_colour_texel(world, key.level) / world.a());
   std::vector<std::uint32_t> found;
   for (auto layer = model.layers_.rbegin(); layer != model.layers_.rend(); ++layer) {

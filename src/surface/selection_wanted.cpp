@@ -70,7 +70,7 @@ void inherit_owners(Node& node) {
 std::size_t bytes_of_tile(const TileFacts& facts, std::size_t mesh_bytes) {
   constexpr std::size_t kSlopes = kSlopeSlotSide * kSlopeSlotSide * 4 * 4 / 3;
   constexpr std::size_t kColour = kColourSlotSide * kColourSlotSide * 4 * 4 / 3;
-  return mesh_bytes + (facts.own_slopes ? kSlopes : 0) + kColour * (std::size_t{facts.own_colour} + std::size_t{facts.own_effects} + std::size_t{facts.own_overlay});
+  return mesh_bytes + (facts.own_slopes ? kSlopes : 0) + kColour * (std::size_t{facts.own_colour} + std::size_t{facts.own_effects} + std::size_t{facts.own_overlay} + std::size_t{facts.own_normals});
 }
 
 SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const SelectionSettings& settings,

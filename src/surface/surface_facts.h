@@ -18,6 +18,7 @@ struct TileFacts {
   bool own_colour = false;            ///< some imagery under it has samples smaller than two of its parent's texels: it gets a slot of its own
   bool own_effects = false;           ///< and another one, for night and water
   bool own_overlay = false;           ///< and one for what lies over the light
+  bool own_normals = false;           ///< and one for normals
   bool finer_colour_below = false;    ///< the same of its own texels
   bool own_slopes = false;            ///< elevation under it is finer than its parent's slope texels
 };

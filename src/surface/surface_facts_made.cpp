@@ -62,6 +62,7 @@ class MadeFacts final : public SurfaceFacts {
     };
     facts.own_effects = has_any_of({ImageUse::night, ImageUse::water});
     facts.own_overlay = has_any_of({ImageUse::overlay});
+    facts.own_normals = has_any_of({ImageUse::normal});
     facts.finer_colour_below = finest_colour < kClearlyFiner * shown_by_texel;
     facts.own_slopes = key.level == 0 || finest_height < kClearlyFiner * 2.0 * nominal_slope_texel(ellipsoid, key.level);
     return facts;

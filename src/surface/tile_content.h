@@ -111,9 +111,10 @@ struct TileGeometry {
 };
 
 /// What an image layer tells of the ground: its colour by day; its brightness, which takes the place of the colours' own; the light
-/// that it gives by night; where there is water; or something that lies over ground and air and that no light changes.
-enum class ImageUse : std::uint8_t { colour, grayscale, night, water, overlay };
-inline constexpr std::size_t kImageUses = 5;
+/// that it gives by night; where there is water; something that lies over ground and air and that no light changes; or how it is inclined:
+/// the unit normal in the frame of east, north and up, (n + 1) / 2 as red, green and blue.
+enum class ImageUse : std::uint8_t { colour, grayscale, night, water, overlay, normal };
+inline constexpr std::size_t kImageUses = 6;
 
 inline constexpr float kUnbounded = 1e4f;  ///< as a limit of texture coordinates: none
 
@@ -150,10 +151,12 @@ struct TileImagery {
   /// Of night and water, for a slot of their own. None of a use of which the tile has nothing: neither light nor water.
   std::vector<ImagePatch> effects;
   std::vector<ImagePatch> overlays;  ///< for one more slot
+  std::vector<ImagePatch> normals;   ///< likewise
+  float normals_spacing = 0;         ///< metres between the finest of them
   std::vector<MissingLayer> missing;
   std::size_t bytes() const {
     std::size_t sum = 0;
-    for (const auto* list : {&patches, &effects, &overlays}) {
+    for (const auto* list : {&patches, &effects, &overlays, &normals}) {
       for (const ImagePatch& p : *list) sum += p.image.bytes() + p.image_points.size() * sizeof(glm::vec2);
     }
     return sum;

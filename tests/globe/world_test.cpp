@@ -84,6 +84,7 @@ TEST_CASE("parse_world: mistakes name the file and the line") {
   CHECK(contains(message_of("[planet]\nradius = 3\n"), "w.toml:2: [planet] has no key `radius`"));
   CHECK(contains(message_of("[planet]\nradii = [1, 2]\n"), "w.toml:2: `radii`"));
   CHECK(contains(message_of("\n\n[[layer]]\ngroup = \"heights\"\n"), "w.toml:4: no group is called \"heights\""));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"normal\"\ngamma = 2.0\nsource = { path = \"n.tif\" }\n"), "w.toml:3: normals have no `gamma`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\n"), "w.toml:1: the layer has no `source`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = 2\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));

@@ -214,7 +214,7 @@ TEST_CASE("picture: lights of the night show in the dark only, water mirrors the
 TEST_CASE("picture: an overlay lies over ground and night alike, and light changes nothing of it") {
   const geo::TileKey key{0, 6, 32, 32};
   for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
-    Stage stage(api, without, {.ellipsoid = geo::kWgs84, .air = std::nullopt, .overlays = true});
+    Stage stage(api, without, {.ellipsoid = geo::kWgs84, .air = std::nullopt, .slots = {.overlays = true}});
     REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, exact_geometry(geo::kWgs84, key, flat)).has_value());
     const auto shown = [&](std::array<std::uint8_t, 4> overlay, double sun_from_zenith, bool night_too = false) {
       auto imagery = exact_imagery(key, [](const auto&) { return glm::dvec3(0.2); });
@@ -241,6 +241,52 @@ TEST_CASE("picture: an overlay lies over ground and night alike, and light chang
       for (int c = 0; c < 3; ++c) CHECK(std::abs(half[c] - (kHalf[c] + plain[c] * 127 / 255)) <= 1);
     }
     CHECK(shown(kNothing, kMorning) != shown(kNothing, kMidnight));
+  }
+}
+
+TEST_CASE("picture: normals in the frame of east, north and up shade as the same slopes of the elevation do, unless these are finer") {
+  for (const auto& [api, without] : {std::pair(gpu::Api::core, ""), {gpu::Api::es, "clip_control"}}) {
+    // One tile on the equator, whose slopes run to the east and the south, and one round the north pole.
+    for (const char* pose : {"-0.5,0.5,50000", "78.5,140,50000"}) {
+      Stage stage(api, without, {.ellipsoid = geo::kWgs84, .air = std::nullopt, .slots = {.normals = true}});
+      const view::Camera camera = camera_at(pose);
+      const geo::Geodetic below = geo::to_geodetic(geo::kWgs84, camera.eye);
+      const geo::TileKey key = geo::tile_at(geo::normal_at({below.latitude, below.longitude}), 6);
+      CAPTURE(geo::to_string(key));
+      const auto shown = [&](glm::dvec2 rise, bool by_normals, float spacing = 1.0f) {  // rise to the east and to the north
+        auto geometry = exact_geometry(geo::kWgs84, key, flat);
+        // Along the slope map's own axes at the place that is looked at.
+        const auto from_enu = geo::enu_at(geo::kWgs84, below);
+        const glm::dvec3 up = from_enu(geo::Vector<geo::Enu>{{0, 0, 1}}).xyz, along = from_enu(geo::Vector<geo::Enu>{{rise.x, rise.y, 0}}).xyz;
+        const glm::dvec3 tangent = geometry.slopes.tangent.xyz, tu = glm::normalize(tangent - glm::dot(tangent, up) * up), tv = glm::cross(tu, up);
+        const glm::vec2 slope = by_normals ? glm::vec2(0.7f, -0.4f) : glm::vec2(glm::dot(along, tu), glm::dot(along, tv));
+        geometry.slopes.slopes.assign(surface::kSlopeSlotSide * surface::kSlopeSlotSide, slope);
+        REQUIRE(stage.renderer->upload_geometry(*stage.thread, key, geometry).has_value());
+        auto imagery = exact_imagery(key, [](const auto&) { return glm::dvec3(0.8); });
+        if (by_normals) {
+          const glm::dvec3 normal = glm::normalize(glm::dvec3(-rise.x, -rise.y, 1.0));
+          auto patch = imagery.patches.front();
+          patch.use = surface::ImageUse::normal;
+          patch.image = {1, 1, {}};
+          for (int c = 0; c < 3; ++c) patch.image.rgba.push_back(static_cast<std::uint8_t>(std::lround((normal[c] + 1.0) / 2.0 * 255.0)));
+          patch.image.rgba.push_back(255);
+          imagery.normals = {patch};
+          imagery.normals_spacing = spacing;
+        }
+        REQUIRE(stage.renderer->upload_colour(*stage.thread, key, imagery).has_value());
+        const DrawTile tile = draw_alone(key);
+        FrameLook look;
+        look.to_sun = from_enu(geo::Vector<geo::Enu>{glm::normalize(glm::dvec3(0.6, 0.3, 1.0))});
+        return int{pixel(stage.picture(camera, look, {&tile, 1}), kWidth / 2, kHeight / 2)[0]};
+      };
+      for (const glm::dvec2 rise : {glm::dvec2(0.0), {0.5, 0.0}, {-0.5, 0.0}, {0.0, 0.5}, {0.0, -0.5}, {0.3, -0.6}}) {
+        CAPTURE(rise.x);
+        CAPTURE(rise.y);
+        CHECK(std::abs(shown(rise, true) - shown(rise, false)) <= 1);
+      }
+      CHECK(shown({-0.5, 0.0}, true) > shown({0.5, 0.0}, true) + 30);
+      CHECK(shown({-0.5, 0.0}, true, 1e6f) == shown({0.5, 0.0}, true, 1e6f));
+    }
   }
 }
 
