@@ -6,6 +6,7 @@ uniform sampler2D u_below;    // the slot as it was before
 uniform vec4 u_image_texels;  // xy: size of the image in texels; zw: of the texture that holds it
 uniform vec4 u_extent;        // texels of the image between which there are data
 uniform vec2 u_pixel;         // of the raster, in texels of the image
+uniform vec2 u_feather;       // texels of the image over which it fades inwards from there; 0: it ends on its border
 uniform vec3 u_adjust;        // opacity, gamma, multiplier
 
 flat in vec4 v_lower_points;
@@ -20,8 +21,10 @@ void main() {
   vec2 texel = mix(lower, upper, v_in_cell.y) * u_image_texels.xy;
   vec2 along_x = dFdx(texel), along_y = dFdy(texel);
   vec2 slot_texel = sqrt(along_x * along_x + along_y * along_y);
-  vec2 beyond = max(u_extent.xy - texel, texel - u_extent.zw) / max(max(slot_texel, u_pixel), 1e-6);
-  float there = 1.0 - clamp(max(beyond.x, beyond.y), 0.0, 1.0);
+  bool is_soft = u_feather.x > 0.0;
+  vec2 beyond = max(u_extent.xy - texel, texel - u_extent.zw) / max(max(slot_texel, is_soft ? u_feather : u_pixel), 1e-6);
+  float there = (is_soft ? 0.0 : 1.0) - max(beyond.x, beyond.y);
+  there = clamp(there, 0.0, 1.0);
   // Where the slot's texel is larger than the image's, up to twice, the mean under it: of four places, as far apart as is needed.
   float aside = 0.5 - 0.5 / max(max(slot_texel.x, slot_texel.y), 1.0);
   vec2 x = aside * along_x, y = aside * along_y;
@@ -32,6 +35,11 @@ void main() {
   colour.rgb = clamp(pow(plain, vec3(u_adjust.y)) * u_adjust.z, 0.0, 1.0) * colour.a;
 #endif
 #ifdef MASK
+  if (is_soft) {
+    if (colour.a <= 0.0) discard;
+    o_colour = vec4(mix(texelFetch(u_below, ivec2(gl_FragCoord.xy), 0).a, colour.r / colour.a, colour.a * u_adjust.x));
+    return;
+  }
   if (colour.a < 0.5) discard;
   o_colour = vec4(colour.r / colour.a);
 #elif defined(GRAYSCALE)

@@ -51,6 +51,8 @@ bool settings_rows(globe::LayerSettings& settings, globe::LayerGroup group) {
     return ImGui::SliderScalar(name, ImGuiDataType_Double, &value, &least, &most, "%.2f", flags | ImGuiSliderFlags_AlwaysClamp);
   };
   bool changed = slider("opacity", settings.opacity, 0.0, 1.0);
+  changed |= slider("feather", settings.feather, 0.0, std::max(200.0, settings.feather), ImGuiSliderFlags_Logarithmic);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("fades in from its edges over so many pixels of the data");
   if (group == globe::LayerGroup::normal) return changed;
   changed |= slider("gamma", settings.gamma, 0.1, 10.0, ImGuiSliderFlags_Logarithmic);
   changed |= slider("multiplier", settings.multiplier, 0.0, 4.0);

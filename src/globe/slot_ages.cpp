@@ -12,7 +12,7 @@ using Layers = std::vector<surface::Layer>;
 
 bool shows_the_same(const surface::Layer& a, const surface::Layer& b) {
   return a.source_id == b.source_id && a.content == b.content && a.source == b.source && !a.catalogue == !b.catalogue && a.opacity == b.opacity && a.gamma == b.gamma &&
-         a.multiplier == b.multiplier && a.adds == b.adds;
+         a.multiplier == b.multiplier && a.feather == b.feather && a.adds == b.adds;
 }
 
 /// Where `some` show what `others` do not; both outlive the answer.

@@ -183,6 +183,7 @@ std::shared_ptr<const surface::SurfaceDescription> SurfaceSteps::describe(const 
     layer.opacity = static_cast<float>(one.settings.opacity);
     layer.gamma = static_cast<float>(one.settings.gamma);
     layer.multiplier = static_cast<float>(one.settings.multiplier);
+    layer.feather = one.settings.feather;
     layer.adds = one.settings.adds;
     layer.use = use_of(one.spec.group);
     (one.spec.group == LayerGroup::height ? description->heights : description->colours).push_back(std::move(layer));

@@ -87,13 +87,14 @@ struct SourceSpec {
 /// The path, or the URL without what is secret in it; empty if there is neither.
 std::string data_name(const SourceSpec& source);
 
-inline constexpr double kLeastGamma = 0.01, kMostGamma = 100.0, kMostMultiplier = 1e6;
+inline constexpr double kLeastGamma = 0.01, kMostGamma = 100.0, kMostMultiplier = 1e6, kMostFeather = 1e5;
 
 /// What of a layer may be changed while its world is open.
 struct LayerSettings {
   double opacity = 1.0;     ///< 0 to 1
   double gamma = 1.0;       ///< kLeastGamma to kMostGamma
   double multiplier = 1.0;  ///< within +-kMostMultiplier
+  double feather = 0.0;     ///< pixels of a raster over which it fades inwards from where its data end, to kMostFeather; not of heights
   bool enabled = true;
   bool adds = false;        ///< height layers: added to the ones below instead of replacing them
 

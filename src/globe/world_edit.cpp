@@ -170,6 +170,7 @@ Result<void> WorldText::set_settings(std::size_t layer, const LayerSettings& set
   if (settings.opacity != now.opacity) change(text, "opacity", to_toml(settings.opacity));
   if (settings.gamma != now.gamma) change(text, "gamma", to_toml(settings.gamma));
   if (settings.multiplier != now.multiplier) change(text, "multiplier", to_toml(settings.multiplier));
+  if (settings.feather != now.feather) change(text, "feather", to_toml(settings.feather));
   if (settings.enabled != now.enabled) change(text, "enabled", settings.enabled ? "true" : "false");
   if (settings.adds != now.adds) change(text, "mode", settings.adds ? "\"add\"" : "\"replace\"");
   now = settings;

@@ -140,6 +140,7 @@ toml::table layer_table(const LayerSpec& layer, const std::filesystem::path& fol
   if (layer.opacity != 1.0) table.insert("opacity", layer.opacity);
   if (layer.gamma != 1.0) table.insert("gamma", layer.gamma);
   if (layer.multiplier != 1.0) table.insert("multiplier", layer.multiplier);
+  if (layer.feather != 0.0) table.insert("feather", layer.feather);
   if (!layer.enabled) table.insert("enabled", false);
   if (layer.adds) table.insert("mode", "add");
   if (!layer.attribution.empty()) table.insert("attribution", layer.attribution);

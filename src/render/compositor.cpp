@@ -15,7 +15,7 @@ using surface::ImagePatch;
 
 constexpr std::uint32_t kAdjust = 1, kMask = 2, kGrayscale = 4;  // feature bits
 constexpr std::size_t kMaxScratch = 8;
-enum Uniform { u_slot_range, u_cells, u_image_texels, u_extent, u_pixel, u_adjust };
+enum Uniform { u_slot_range, u_cells, u_image_texels, u_extent, u_pixel, u_feather, u_adjust };
 
 constexpr float kSide = surface::kColourSlotSide;
 constexpr float kGutter = surface::kColourGutter;
@@ -38,7 +38,7 @@ Result<Compositor> Compositor::create(gpu::RenderThread& thread) {
   gpu::ProgramFamily programs({shader_texts({"compose.vert"}),
                                shader_texts({"compose.frag"}),
                                {"ADJUST", "MASK", "GRAYSCALE"},
-                               {"u_slot_range", "u_cells", "u_image_texels", "u_extent", "u_pixel", "u_adjust"},
+                               {"u_slot_range", "u_cells", "u_image_texels", "u_extent", "u_pixel", "u_feather", "u_adjust"},
                                {"u_image", "u_below"},
                                {}});
   for (const std::uint32_t features : {0u, kAdjust, kMask, kAdjust | kMask, kGrayscale, kAdjust | kGrayscale}) {
@@ -130,7 +130,9 @@ Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch
   const bool is_mask = patch.use == surface::ImageUse::water, is_grayscale = patch.use == surface::ImageUse::grayscale;
   const auto program = programs_.variant(thread, (adjusts ? kAdjust : 0u) | (is_mask ? kMask : 0u) | (is_grayscale ? kGrayscale : 0u));
   if (!program) return program.error();
-  if (is_grayscale) keep_below();
+  const glm::vec2 size(patch.image.width, patch.image.height), feather = patch.feather * size;
+  const bool is_soft_mask = is_mask && feather.x > 0.0f;  // the slot's other channels are none of its own: the shader mixes
+  if (is_grayscale || is_soft_mask) keep_below();
 
   const Scratch& scratch = scratch_for(thread, patch.image, budget);
   const GLint filter = patch.linear ? GL_LINEAR : GL_NEAREST;
@@ -148,11 +150,14 @@ Result<void> Compositor::draw(gpu::RenderThread& thread, const ImagePatch& patch
   glUniform2i(locations[u_cells], patch.columns, patch.rows);
   glUniform4f(locations[u_image_texels], static_cast<float>(patch.image.width), static_cast<float>(patch.image.height),
               static_cast<float>(scratch.width), static_cast<float>(scratch.height));
-  const glm::vec2 size(patch.image.width, patch.image.height), lower = patch.data_lower * size, upper = patch.data_upper * size, pixel = patch.data_pixel * size;
+  const glm::vec2 lower = patch.data_lower * size, upper = patch.data_upper * size, pixel = patch.data_pixel * size;
   glUniform4f(locations[u_extent], lower.x, lower.y, upper.x, upper.y);
   glUniform2f(locations[u_pixel], pixel.x, pixel.y);
+  glUniform2f(locations[u_feather], feather.x, feather.y);
   glUniform3f(locations[u_adjust], patch.opacity, patch.gamma, patch.multiplier);
-  if (is_mask) {  // drawn where the image is, by the opacity of the layer
+  if (is_soft_mask) {
+    glDisable(GL_BLEND);
+  } else if (is_mask) {  // drawn where the image is, by the opacity of the layer
     glEnable(GL_BLEND);
     glBlendEquation(GL_FUNC_ADD);
     glBlendColor(0, 0, 0, patch.opacity);

@@ -35,6 +35,7 @@ struct Layer {
   float opacity = 1.0f;
   float gamma = 1.0f;
   float multiplier = 1.0f;
+  double feather = 0.0;          ///< image layers: pixels of a raster over which it fades inwards from where its data end
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
   ImageUse use = ImageUse::colour;  ///< image layers: what they are drawn into
 

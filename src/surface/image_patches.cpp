@@ -16,39 +16,11 @@
 
 #include "surface/control_grid.h"
 #include "surface/error_scan.h"
+#include "surface/feather.h"
 #include "surface/tile_grid.h"
 
 namespace tellurion::surface {
 namespace {
-
-/// Pixels of level 0 between which a raster ends. It does not where it goes round the body, or where it ends in a point, a pole of its
-/// projection: nothing lies beyond that.
-struct Extent {
-  glm::dvec2 lower{-INFINITY};
-  glm::dvec2 upper{INFINITY};
-
-  bool holds(glm::dvec2 pixel) const { return glm::all(glm::greaterThanEqual(pixel, lower)) && glm::all(glm::lessThanEqual(pixel, upper)); }
-};
-
-Extent extent_of(const source::RasterDescription& raster, source::RasterReader& reader) {
-  const source::LevelSize& size = raster.levels.front();
-  const auto is_pole = [&](double y) {
-    const std::array<glm::dvec2, 2> pixels{glm::dvec2(0.25 * size.width, y), glm::dvec2(0.75 * size.width, y)};
-    std::array<geo::LatLon, 2> places;
-    reader.to_places(pixels, places);
-    const double step = raster.spacing.value / raster.ellipsoid.b();
-    return std::all_of(places.begin(), places.end(),
-                       [&](const geo::LatLon& p) { return std::cos(p.latitude.value) < 0.5 * step; });
-  };
-  Extent extent;
-  if (!raster.wraps) {
-    extent.lower.x = 0.0;
-    extent.upper.x = size.width;
-  }
-  if (!is_pole(0.0)) extent.lower.y = 0.0;
-  if (!is_pole(size.height)) extent.upper.y = size.height;
-  return extent;
-}
 
 /// A window of a level, to be reduced by whole factors on each axis after reading.
 struct WindowChoice {
@@ -168,30 +140,38 @@ void drop_dark(std::vector<ImagePatch>& effects) {
 }
 
 /// Pixels of a window after reduction, with the way into them.
-struct Window {
+struct Window : ImagePlace {
   raster::Image image;
-  glm::dvec2 first{0.0};  ///< of level 0
-  glm::dvec2 scale{0.0};  ///< pixels of `image` per pixel of level 0
 };
 
-/// Empty if there is nothing to show.
-Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dvec2> pixels, glm::dvec2 pixels_per_texel) {
+/// Where a raster's data end, and over how many of its pixels it fades inwards from there.
+struct Edges {
+  Extent extent;
+  double feather = 0;
+};
+
+/// Faded near voids, not near the border. Empty if there is nothing to show.
+Result<Window> read_window(cache::CachedRaster& raster, std::span<const glm::dvec2> pixels, glm::dvec2 pixels_per_texel, const Edges& edges) {
   const source::RasterDescription& about = raster.description();
   Window window;
   const std::optional<WindowChoice> choice = choose_window(about, pixels, pixels_per_texel);
   if (!choice) return window;
-  Result<raster::Image> image = raster.read_colours(choice->level, choice->window);
-  if (!image) return image.error();
-  window.image = reduced(std::move(*image), choice->reduction);
   const glm::dvec2 scale = source::level_scale(about, choice->level);
   window.first = glm::dvec2(choice->window.x, choice->window.y) / scale;
   window.scale = scale / glm::dvec2(choice->reduction);
+  Result<raster::Image> image = raster.read_colours(choice->level, choice->window);
+  Result<VoidDistances> voids = VoidDistances{};  // asked for even if the image is on its way
+  if (edges.feather > 0.0) voids = find_voids(raster, choice->level, window.first, window.first + glm::dvec2(choice->window.width, choice->window.height) / scale, edges.feather);
+  if (!image) return image.error();
+  if (!voids) return voids.error();
+  window.image = reduced(std::move(*image), choice->reduction);
+  fade_from_voids(window.image, window, *voids, edges.extent, edges.feather);
   return window;
 }
 
 /// Where the source's projection is smooth: the window itself, drawn through the control points.
-Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& grid, const Extent& extent) {
-  Result<Window> window = read_window(raster, grid.pixels, grid.pixels_per_texel);
+Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& grid, const Edges& edges) {
+  Result<Window> window = read_window(raster, grid.pixels, grid.pixels_per_texel, edges);
   if (!window) return window.error();
   ImagePatch patch;
   patch.columns = grid.columns;
@@ -204,10 +184,12 @@ Result<ImagePatch> window_patch(cache::CachedRaster& raster, const ControlGrid& 
   const auto limit = [&](glm::dvec2 pixel) {
     return glm::vec2(glm::clamp((pixel - window->first) * window->scale / size, -double{kUnbounded}, double{kUnbounded}));
   };
-  patch.data_lower = limit(extent.lower);
-  patch.data_upper = limit(extent.upper);
+  patch.data_lower = limit(edges.extent.lower);
+  patch.data_upper = limit(edges.extent.upper);
   patch.data_pixel = window->scale / size;
-  patch.opaque = is_opaque(window->image) && std::ranges::all_of(grid.pixels, [&](const glm::dvec2& pixel) { return extent.holds(pixel); });
+  patch.feather = edges.feather * window->scale / size;
+  const double fades = edges.feather > 0.0 ? std::max(edges.feather, 2.0 * std::max(grid.pixels_per_texel.x, grid.pixels_per_texel.y)) : 0.0;
+  patch.opaque = is_opaque(window->image) && std::ranges::all_of(grid.pixels, [&](const glm::dvec2& pixel) { return edges.extent.inside(pixel) >= fades; });
   patch.image = std::move(window->image);
   return patch;
 }
@@ -229,7 +211,7 @@ std::array<float, 4> sample(const raster::Image& image, glm::dvec2 at) {
 
 /// Where it is not: the texels themselves, each the mean of kPerTexel^2 places.
 Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
-                               const Extent& extent) {
+                               const Edges& edges) {
   constexpr int kPerTexel = 2;
   const glm::ivec2 texels = glm::ivec2(grid.columns, grid.rows) * grid.cell_texels;
   const glm::ivec2 samples = texels * kPerTexel;
@@ -243,7 +225,7 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
   }
   std::vector<glm::dvec2> pixels(places.size());
   raster.reader().to_pixels(places, pixels);
-  const Result<Window> window = read_window(raster, pixels, grid.pixels_per_texel);
+  const Result<Window> window = read_window(raster, pixels, grid.pixels_per_texel, edges);
   if (!window) return window.error();
 
   ImagePatch patch;
@@ -258,9 +240,10 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
       for (int i = 0; i < kPerTexel * kPerTexel; ++i) {
         const int x = column * kPerTexel + i % kPerTexel, y = row * kPerTexel + i / kPerTexel;
         const glm::dvec2 pixel = pixels[static_cast<std::size_t>(y * samples.x + x)];
-        if (!extent.holds(pixel)) continue;  // or NaN
+        const auto opacity = static_cast<float>(opacity_at(edges.extent, pixel, edges.feather));
+        if (opacity == 0.0f) continue;
         const std::array<float, 4> colour = sample(window->image, (pixel - window->first) * window->scale);
-        for (std::size_t c = 0; c < 4; ++c) sum[c] += colour[c];
+        for (std::size_t c = 0; c < 4; ++c) sum[c] += opacity * colour[c];
       }
       for (const float channel : sum) {
         patch.image.rgba.push_back(static_cast<std::uint8_t>(std::lround(channel / (kPerTexel * kPerTexel))));
@@ -273,8 +256,8 @@ Result<ImagePatch> texel_patch(cache::CachedRaster& raster, const geo::TileKey& 
 
 /// A patch without an image if there is nothing to show.
 Result<ImagePatch> make_patch(cache::CachedRaster& raster, const geo::TileKey& key, const ControlGrid& grid,
-                              const Extent& extent) {
-  Result<ImagePatch> patch = grid.follows ? window_patch(raster, grid, extent) : texel_patch(raster, key, grid, extent);
+                              const Edges& edges) {
+  Result<ImagePatch> patch = grid.follows ? window_patch(raster, grid, edges) : texel_patch(raster, key, grid, edges);
   if (!patch) return patch.error();
   patch->lower = glm::vec2(grid.lower);
   patch->upper = glm::vec2(grid.upper);
@@ -349,11 +332,11 @@ class Composition {
     }
     source::RasterReader& reader = raster.reader();
     const SlotMapping mapping = map_slot(world_, key_, raster.description(), reader);
-    const Extent extent = extent_of(raster.description(), reader);
+    const Edges edges{extent_of(raster.description(), reader), settings.feather};
     bool hides_all_below = mapping.whole;
     for (const ControlGrid& grid : mapping.grids) {
       if (stop_.stop_requested()) return Error{ErrorCode::cancelled, "imagery of " + geo::to_string(key_)};
-      Result<ImagePatch> patch = make_patch(raster, key_, grid, extent);
+      Result<ImagePatch> patch = make_patch(raster, key_, grid, edges);
       if (!patch && patch.error().code == ErrorCode::pending) {
         pending_ = true;  // taken for opaque: what lies below is asked for once it shows
         continue;

@@ -132,6 +132,7 @@ struct ImagePatch {
   glm::vec2 data_lower{-kUnbounded};
   glm::vec2 data_upper{kUnbounded};
   glm::vec2 data_pixel{0.0f};           ///< size of the raster's pixels there
+  glm::vec2 feather{0.0f};              ///< not 0: it fades inwards from there instead, over so much (or a texel if that is larger)
   bool opaque = false;                  ///< covers its whole rectangle with alpha 1
   bool linear = true;                   ///< bilinear filtering; else nearest
   float opacity = 1.0f;

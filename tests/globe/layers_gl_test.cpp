@@ -103,6 +103,7 @@ TEST_CASE("settings and order of layers that change while they are shown look as
   set("half transparent", 3, [](LayerSettings& s) { s.opacity = 0.5; });
   set("gamma", 2, [](LayerSettings& s) { s.gamma = 0.6; });
   set("multiplier", 3, [](LayerSettings& s) { s.multiplier = 1.5; });
+  set("feather", 3, [](LayerSettings& s) { s.feather = 25.0; });
   set("a picture that was off", 4, [](LayerSettings& s) { s.enabled = true; });
   std::swap(world.layers[3], world.layers[4]);
   changes_to("order", [](Globe& globe) { REQUIRE(globe.move_layer(3, true)); });
@@ -133,6 +134,11 @@ TEST_CASE("set_layer and move_layer: what cannot be is said, and nothing changes
   settings.opacity = 1.5;
   CHECK(globe->set_layer(2, settings).error().message == "layer \"" + files.red.path() + "\": `opacity` is 0 to 1, not 1.5");
   settings.opacity = 1.0;
+  settings.feather = -1.0;
+  CHECK(globe->set_layer(2, settings).error().message == "layer \"" + files.red.path() + "\": `feather` is 0 to 100000, not -1");
+  settings.feather = 5.0;
+  CHECK(globe->set_layer(0, settings).error().code == ErrorCode::invalid_argument);
+  settings.feather = 0.0;
   settings.adds = true;
   CHECK(globe->set_layer(2, settings).error().code == ErrorCode::invalid_argument);
   CHECK(globe->set_layer(9, {}).error().code == ErrorCode::invalid_argument);

@@ -199,6 +199,9 @@ TEST_CASE("set_settings: values change where they stand or come right under the 
   CHECK(world.world().layers[1] == settings);
   REQUIRE(world.set_settings(1, settings).has_value());
   CHECK(world.world().layers[1] == settings);
+  settings.feather = 40.0;
+  REQUIRE(world.set_settings(1, settings).has_value());
+  CHECK(world.text().find("[[layer]]  # strips\nfeather = 40.0\nenabled = false\n") != std::string::npos);
 
   LayerSettings heights = world.world().layers[0];
   heights.adds = true;

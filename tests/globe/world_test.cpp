@@ -26,6 +26,7 @@ source = { path = "../viking.tif", bands = [3, 2, 1], crs = "IAU_2015:49900" }
 opacity = 0.5
 gamma = 2
 multiplier = 1.5
+feather = 12.5
 enabled = false
 )";
 
@@ -61,6 +62,7 @@ TEST_CASE("parse_world: reads every key") {
   CHECK(colour.opacity == 0.5);
   CHECK(colour.gamma == 2.0);
   CHECK(colour.multiplier == 1.5);
+  CHECK(colour.feather == 12.5);
   CHECK_FALSE(colour.enabled);
 }
 
@@ -89,6 +91,8 @@ TEST_CASE("parse_world: mistakes name the file and the line") {
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = 2\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[layer]\ngroup = \"color\"\n"), "two brackets"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nfeather = -1\nsource = { path = \"a\" }\n"), "w.toml:3: `feather` must be a number from 0 to 100000"));
+  CHECK(contains(message_of("[[layer]]\ngroup = \"height\"\nfeather = 8\nsource = { path = \"a\" }\n"), "w.toml:3: only pictures have a `feather`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \n"), "w.toml:2: not valid TOML"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"wfs\", url = \"u\" }\n"), "\"wfs\""));
   const auto tiles = [](const std::string& more) {

@@ -214,6 +214,31 @@ TEST_CASE("compose: beyond a raster's border its last pixel fades over one pixel
   }
 }
 
+TEST_CASE("compose: with a feather a raster fades inwards from its border, over a texel at least, by the nearer side in a corner") {
+  for (const gpu::Api api : {gpu::Api::core, gpu::Api::es}) {
+    Bench bench(api);
+    for (const double feather : {0.25, 30.0, 5000.0}) {  // texels of the slot
+      CAPTURE(feather);
+      ImagePatch patch = plain_patch({255, 255, 255, 255}, false, glm::vec2(0.0f), glm::vec2(1.0f));
+      patch.data_upper = {0.5f, 0.75f};
+      patch.data_pixel = glm::vec2(static_cast<float>(1.0 / kInner));
+      patch.feather = glm::vec2(static_cast<float>(feather / kInner));
+      const auto texels = bench.compose({plain_patch({0, 0, 0, 255}, true, kAllLower, kAllUpper), patch});
+      int in_corner = 0;
+      for (int row = surface::kColourGutter; row < kSide - surface::kColourGutter; ++row) {
+        for (int column = surface::kColourGutter; column < kSide - surface::kColourGutter; ++column) {
+          const double x = 0.5 * kInner - (column + 0.5 - surface::kColourGutter), y = 0.75 * kInner - (row + 0.5 - surface::kColourGutter);
+          const double white = 255.0 * std::clamp(std::min(x, y) / std::max(feather, 1.0), 0.0, 1.0);
+          REQUIRE(std::abs(texel(texels, column, row)[0] - white) <= 1.0);
+          if (x < 0.0 || y < 0.0) REQUIRE(texel(texels, column, row)[0] == 0);
+          in_corner += x > 0.0 && y > 0.0 && x < feather && y < feather;
+        }
+      }
+      if (feather > 1.0) CHECK(in_corner >= 800);
+    }
+  }
+}
+
 TEST_CASE("compose: a translucent patch over an opaque one adds up as premultiplied colours do") {
   Bench bench(gpu::Api::core);
   const ImagePatch below = bent_patch(256, 256, true);
@@ -320,6 +345,25 @@ TEST_CASE("compose: textures for images are few, and counted") {
   }
   // Widths 64 to 2048 in a height of 64, at 4 bytes.
   CHECK(bench.budget.used - slots == std::size_t{64} * (64 + 128 + 256 + 512 + 1024 + 2048) * 4);
+}
+
+TEST_CASE("compose_effects: water with a feather passes into the water below, and the light beside it stays") {
+  Bench bench(gpu::Api::core);
+  auto city = plain_patch({200, 100, 50, 255}, true, kAllLower, kAllUpper), sea = plain_patch({255, 255, 255, 255}, true, kAllLower, kAllUpper);
+  auto land = plain_patch({0, 0, 0, 255}, false, glm::vec2(0.0f), glm::vec2(1.0f));
+  city.use = surface::ImageUse::night;
+  sea.use = land.use = surface::ImageUse::water;
+  land.data_upper = {0.5f, surface::kUnbounded};
+  land.feather = glm::vec2(static_cast<float>(40.0 / kInner));
+  land.opacity = 0.8f;
+  const auto texels = bench.compose_effects({city, sea, land});
+  for (int column = surface::kColourGutter; column < kSide - surface::kColourGutter; ++column) {
+    const double inside = 0.5 * kInner - (column + 0.5 - surface::kColourGutter);
+    const double water = 255.0 * (1.0 - 0.8 * std::clamp(inside / 40.0, 0.0, 1.0));
+    const auto found = texel(texels, column, 100);
+    CHECK(std::abs(found[3] - water) <= 1.0);
+    CHECK(found[0] == 200);
+  }
 }
 
 TEST_CASE("compose_effects: light by night in red, green and blue, water in alpha, and neither touches the other") {

@@ -77,8 +77,10 @@ std::optional<glm::dvec4> drawn(const ImagePatch& patch, glm::dvec2 st) {
     if (!next) next = image_place(patch, st - way);
     if (next) step += (*next - *place) * (*next - *place);
   }
-  const glm::dvec2 beyond = glm::max(glm::dvec2(patch.data_lower) - *place, *place - glm::dvec2(patch.data_upper)) / glm::max(glm::max(glm::sqrt(step), glm::dvec2(patch.data_pixel)), 1e-12);
-  return (1.0 - std::clamp(std::max(beyond.x, beyond.y), 0.0, 1.0)) * sampled(patch.image, *place);
+  const bool is_soft = patch.feather.x > 0.0f;
+  const glm::dvec2 beyond = glm::max(glm::dvec2(patch.data_lower) - *place, *place - glm::dvec2(patch.data_upper)) /
+                            glm::max(glm::max(glm::sqrt(step), glm::dvec2(is_soft ? patch.feather : patch.data_pixel)), 1e-12);
+  return std::clamp((is_soft ? 0.0 : 1.0) - std::max(beyond.x, beyond.y), 0.0, 1.0) * sampled(patch.image, *place);
 }
 
 /// A slot after all patches, each over the ones before.
@@ -302,6 +304,56 @@ TEST_CASE("build_imagery: beyond a raster's border nothing is drawn, within it a
   CHECK(inside > 1000);
   CHECK(outside > 1000);
   CHECK(in_void > 300);
+}
+
+TEST_CASE("build_imagery: a feather fades a raster in from its border and from its voids, to nothing beyond") {
+  MadeRaster region;
+  region.width = region.height = 500;
+  region.west = 10, region.east = 20, region.south = 40, region.north = 50;
+  region.colour = [](int x, int y) {
+    return x >= 200 && x < 300 && y >= 200 && y < 300 ? std::array<std::uint8_t, 4>{0, 0, 0, 0} : std::array<std::uint8_t, 4>{255, 255, 255, 255};
+  };
+  constexpr double kFeather = 40.0, kPixel = 0.02;  // pixels; degrees
+  Layer layer = layer_of(region, 1);
+  layer.feather = kFeather;
+  Pictures pictures({layer});
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0, 256);
+  int ramp = 0, outside = 0, full = 0, corner = 0;
+  for (int level = 5; level <= 9; ++level) {
+    for (const auto& [lat, lon] : {std::pair(45.0, 15.0), std::pair(49.9, 14.0), std::pair(41.0, 19.9), std::pair(40.1, 10.1), std::pair(46.1, 13.9)}) {
+      const geo::TileKey key = geo::tile_at(geo::normal_at(at(lat, lon)), level);
+      CAPTURE(geo::to_string(key));
+      const TileImagery imagery = pictures.of(key);
+      for (int i = 0; i < 2000; ++i) {
+        const glm::dvec2 st = slot_st(share(random), share(random));
+        const geo::LatLon place = geo::place_of_normal(geo::tile_normal(key, st));
+        const glm::dvec2 pixel = glm::dvec2(to_degrees(place.longitude).value - 10, 50 - to_degrees(place.latitude).value) / kPixel;
+        const glm::dvec2 to_border = glm::min(pixel, 500.0 - pixel), to_void = glm::max(glm::max(200.0 - pixel, pixel - 300.0), 0.0);
+        const double border = std::min(to_border.x, to_border.y);
+        const double expected = std::clamp(std::min(border, glm::length(to_void)) / kFeather, 0.0, 1.0);
+        // A third of a texel for the place, what bilinear filtering rounds off where a slope ends, half a pixel round a void's corner.
+        const double texel = to_degrees(geo::tile_angle(key.level)).value / 248 / kPixel;
+        const double off = std::max(texel, 1.0) / kFeather + 0.01;
+        const double alpha = composed(imagery, st).w / 255;
+        REQUIRE(std::abs(alpha - expected) < off);
+        if (border < 0) REQUIRE(alpha <= texel / 3 / kFeather);
+        outside += border < 0;
+        full += expected == 1.0;
+        ramp += expected > 0.1 && expected < 0.9;
+        corner += expected > 0.1 && expected < 0.9 && to_border.x < kFeather && to_border.y < kFeather;
+      }
+      for (const ImagePatch& patch : imagery.patches) {
+        if (patch.opaque) CHECK(std::abs(lat - 45.0) < 3.0);  // not those that touch a border
+      }
+    }
+  }
+  CHECK(ramp > 1000);
+  CHECK(outside > 1000);
+  CHECK(full > 1000);
+  CHECK(corner > 100);
 }
 
 TEST_CASE("build_imagery: where two layers end on one line nothing shows between them") {
