@@ -15,7 +15,7 @@ from _services import free_port
 MB = 1 << 20
 LARGEST_TILE = 4 * MB   # a 512x512 picture with its mip levels, with room to spare
 LARGEST_FILE = 2 * MB   # of the server's tiles, encoded
-BUDGETS_MB = {"memory": 96, "gpu": 96, "disk": 48}
+BUDGETS_MB = {"memory": 48, "gpu": 96, "disk": 48}
 SECONDS = 3600
 SERVER = SHARED.parent / "tools/tileserver.py"
 
