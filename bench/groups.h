@@ -18,5 +18,6 @@ std::vector<Benchmark> hole_benchmarks();    ///< holes.*: pixels that show the 
 std::vector<Benchmark> memory_benchmarks();  ///< memory.*: what a long flight takes
 std::vector<Benchmark> catalogue_benchmarks();  ///< catalogue.*: thousands of rasters as one layer
 std::vector<Benchmark> layer_benchmarks();      ///< layers.*: many layers over one another
+std::vector<Benchmark> ingest_benchmarks();     ///< ingest.*: preparation beside GDAL's programs
 
 }  // namespace tellurion::bench

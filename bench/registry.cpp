@@ -51,7 +51,7 @@ std::vector<Benchmark> all_benchmarks() {
   std::vector<Benchmark> all;
   for (const auto group : {frame_benchmarks, rtin_benchmarks, query_benchmarks, tile_benchmarks, start_benchmarks,
                            truth_benchmarks, pole_benchmarks, hole_benchmarks, memory_benchmarks, catalogue_benchmarks,
-                           layer_benchmarks}) {
+                           layer_benchmarks, ingest_benchmarks}) {
     std::ranges::move(group(), std::back_inserter(all));
   }
   return all;

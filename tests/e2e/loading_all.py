@@ -75,7 +75,8 @@ source = {{ type = "xyz", url = "{url}/imagery/{{z}}/{{x}}/{{y}}.jpg", tile_size
             most = max(lines, key=lambda line: line[f"{name}_cache_bytes"])
             bytes_ = most[f"{name}_cache_bytes"]
             print(f"{name} cache: at most {bytes_ / MB:.1f} of {BUDGETS_MB[name]} MB, after {most['time']:.0f} s")
-            self.assertGreater(bytes_, 0.9 * BUDGETS_MB[name] * MB, f"the {name} cache was full")
+            full = 0.7 if name == "memory" else 0.9  # a quarter of it waits for files that GDAL reads
+            self.assertGreater(bytes_, full * BUDGETS_MB[name] * MB, f"the {name} cache was full")
             self.assertLessEqual(bytes_, BUDGETS_MB[name] * MB + tile, name)
         sixths = [max(line["resident_bytes"] for line in lines if i <= 6 * line["time"] / SECONDS < i + 1) for i in range(6)]
         print("resident, the most of every ten minutes:", ", ".join(f"{most / MB:.0f}" for most in sixths), "MB")
