@@ -209,6 +209,21 @@ class Restart(IngestCase):
         self.same(out)
         self.assertEqual(list(work.glob("*.part")), [])
 
+    def test_a_second_run_on_the_same_output_is_refused_while_the_first_works(self):
+        out = self.folder / "twice.tif"
+        first = subprocess.Popen([PROGRAM, "ingest", *map(str, self.parts), "--out", str(out), "--workers", "1"], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        self.addCleanup(first.wait)
+        self.addCleanup(first.kill)
+        while first.poll() is None and not (self.folder / "twice.tif.work/plan.json").exists():
+            time.sleep(0.001)
+        first.send_signal(signal.SIGSTOP)
+        self.assertIsNone(first.poll(), "it was done too soon")
+        said = self.tellurion("ingest", *self.parts, "--out", out, status=FAILED).stderr
+        self.assertIn("twice.tif.work: another `tellurion ingest` is at work there", said)
+        first.kill()
+        first.wait()
+        self.ingest(*self.parts, out="twice.tif")
+
     def test_shards_merge_to_the_same(self):
         out = self.folder / "shards.tif"
         for shard in (3, 1, 2):

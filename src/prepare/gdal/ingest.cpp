@@ -20,6 +20,7 @@
 #include "prepare/gdal/inputs.h"
 #include "prepare/gdal/join.h"
 #include "prepare/parallel.h"
+#include "prepare/work_lock.h"
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/gdal_source.h"
 
@@ -172,6 +173,8 @@ Result<IngestReport> ingest(const IngestOptions& options, const IngestWatch& wat
   if (!workers) return workers.error();
   fs::create_directories(folder, error);
   if (error) return {ErrorCode::unavailable, fmt::format("{} cannot be made: {}; is there a folder, and is it writable?", folder.string(), error.message())};
+  const Result<WorkLock> lock = options.shards > 1 ? WorkLock::shard(folder, options.shard, options.shards) : WorkLock::whole(folder);
+  if (!lock) return lock.error();
   if (read_text(folder / kPlanFile) != to_text(plan)) {
     if (Result<void> kept = write_whole(folder / kPlanFile, to_text(plan)); !kept) return kept.error();
   }
@@ -188,11 +191,15 @@ Result<IngestReport> merge(std::vector<fs::path> folders, const fs::path& out, i
   if (folders.empty()) folders.push_back(work_folder(out));
   source::configure_gdal(kLeastCacheBytes);
   std::string text;
+  std::vector<WorkLock> locks;
   for (const fs::path& folder : folders) {
     const std::string its = read_text(folder / kPlanFile);
     if (its.empty()) return {ErrorCode::not_found, fmt::format("{}: holds no chunks; shards of `tellurion ingest` make them", folder.string())};
     if (!text.empty() && its != text) return {ErrorCode::invalid_argument, fmt::format("{} and {} come of different work: the same command and inputs are needed everywhere", folders.front().string(), folder.string())};
     text = its;
+    Result<WorkLock> lock = WorkLock::whole(folder);
+    if (!lock) return lock.error();
+    locks.push_back(std::move(*lock));
   }
   const Result<OutputPlan> plan = plan_from_text(text);
   if (!plan) return {plan.error().code, fmt::format("{}: {}", (folders.front() / kPlanFile).string(), plan.error().message)};
