@@ -21,6 +21,14 @@ constexpr double kPieceDegrees = 60.0;     ///< of longitude: regions are looked
 constexpr std::chrono::milliseconds kPauseBeforeAgain{5500};  ///< longer than fetch::StoreOptions::pause_after_failure
 constexpr int kPieceSteps = 48;            ///< places looked at along a piece's sides, and inside of it
 
+/// Metres between the samples of level 0 at the equator; of other maps than Web Mercator those of the data.
+double spacing_at_equator(const RasterDescription& about) {
+  if (about.crs_wkt != "EPSG:3857") return about.spacing.value;
+  // `spacing` is that of the middle of the bounds on the map.
+  const auto on_map = [](Radians latitude) { return std::asinh(std::tan(latitude.value)); };
+  return about.spacing.value * std::cosh(0.5 * (on_map(about.bounds.south) + on_map(about.bounds.north)));
+}
+
 /// The zoom of the raster's finest level.
 int finest_zoom(const LayerSpec& spec, const RasterDescription& about, const geo::Ellipsoid& world) {
   if (spec.source.type == "xyz") {
@@ -28,7 +36,7 @@ int finest_zoom(const LayerSpec& spec, const RasterDescription& about, const geo
     return static_cast<int>(std::lround(std::log2(static_cast<double>(about.levels.front().width) / (across * spec.source.tile_size))));
   }
   const double zoom_0 = 2.0 * std::numbers::pi * world.a() / 256.0;
-  return static_cast<int>(std::lround(std::log2(zoom_0 / about.spacing.value)));
+  return static_cast<int>(std::lround(std::log2(zoom_0 / spacing_at_equator(about))));
 }
 
 /// Part of a region within the source's own bounds, degrees, west < east.

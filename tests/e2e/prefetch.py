@@ -76,6 +76,14 @@ class Prefetch(Case):
             self.prefetch(self.night(server), self.folder / "coarse", "--bounds", "-180,-85,180,85", "--resolution", "20000")
             self.assertEqual({tile[0] for tile in self.tiles_asked(server)}, {0, 1, 2, 3})
 
+    def test_zooms_of_services_are_those_of_web_mercator_wherever_their_data_lie(self):
+        for south, north in ((-10, 10), (50, 62), (70, 80)):
+            with TileServer() as server:
+                world = self.world("north", ("color", f'type = "tms", url = "{server.url(NIGHT)}/tilemapresource.xml", max_level = 4, bounds = [0, {south}, 40, {north}]'))
+                self.prefetch(world, self.folder / f"north{south}", "--bounds", "0,-85,40,85", "--levels", "3-4")
+                server.asked = {path: count for path, count in server.asked.items() if path.endswith(".png")}
+                self.assertEqual(self.tiles_asked(server), columns_and_rows(0, south, 40, north, 3) | columns_and_rows(0, south, 40, north, 4))
+
     def test_it_goes_on_where_it_was_stopped(self):
         with TileServer(lambda path, times: time.sleep(0.1)) as server:
             world, cache = self.night(server), self.folder / "stopped"

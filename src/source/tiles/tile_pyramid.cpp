@@ -86,7 +86,7 @@ Result<PixelRange> range_of(const std::array<double, 4>& bounds, glm::dvec2 size
   const geo::GeodeticBounds own = bounds_of(all, to_places);
   const auto latitude = [&](double degrees) { return std::clamp(to_radians(Degrees(degrees)).value, own.south.value, own.north.value); };
   // The outline, since in most projections no two corners bound it.
-  constexpr int kSteps = 32;
+  constexpr int kSteps = 512;  // of a parallel round a pole these lie within 2e-5 of its radius
   std::vector<geo::LatLon> outline;
   for (int i = 0; i <= kSteps; ++i) {
     const double share = static_cast<double>(i) / kSteps;
