@@ -31,6 +31,7 @@ test_packages=(
   python3 python3-gdal python3-numpy
   imagemagick x11-apps xauth xdotool xvfb
   mapproxy nginx-light openssl                                 # services and a server to ask
+  munge slurm-client slurmctld slurmd                          # a batch system of one machine
 )
 fuzz_packages=(clang libclang-rt-14-dev)
 bench_packages=(chromium python3 python3-numpy python3-pil)  # bench/compare: the browser, and what a tile server makes tiles with
