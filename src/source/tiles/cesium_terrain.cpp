@@ -10,6 +10,7 @@
 
 #include "fetch/fetch_now.h"
 #include "source/proj/vertical_datum.h"
+#include "source/tiles/archive_tile.h"
 #include "source/tiles/cesium_layer.h"
 #include "source/tiles/height_decoders.h"
 #include "source/tiles/service_url.h"
@@ -80,7 +81,7 @@ Result<std::unique_ptr<RasterSource>> open_cesium_terrain(const CesiumTerrain& t
   pyramid.attribution = layer->attribution;
   if (!layer->parent_url.empty())
     pyramid.hints.push_back(fmt::format("{} lacks tiles that another service has ({}): make that one a layer of its own, before this one.",
-                                        fetch::public_part(terrain.url), fetch::public_part(layer->parent_url)));
+                                        fetch::public_part(terrain.url), plain_text(fetch::public_part(layer->parent_url))));
   std::vector<std::int64_t> rows;
   for (const TileLevel& level : pyramid.grid.levels) rows.push_back(level.rows);
   const auto may_have = [layer = std::move(*layer), rows = std::move(rows)](const TileAddress& tile) {

@@ -109,7 +109,7 @@ Result<GriddedHeights> heights_of(const SqliteArchive& database, const std::stri
   const std::string name = text_of(more->front()[0]);
   const std::string unit = name.substr(name.find_last_of('/') + 1);  // of the URI of a definition the end
   if (const auto metres = metres_of_unit(unit)) heights.unit = *metres;
-  else if (!unit.empty()) heights.hints.push_back(fmt::format("{} has heights in \"{}\", which is no length that is known: they are taken as metres.", database.name(), name));
+  else if (!unit.empty()) heights.hints.push_back(fmt::format("{} has heights in \"{}\", which is no length that is known: they are taken as metres.", database.name(), plain_text(name)));
   if (text_of(more->front()[1]) == "grid-value-is-corner")
     heights.hints.push_back(fmt::format("{} says that its heights are those of cells' corners; they are shown at cells' centres, half a sample off.", database.name()));
   return heights;
