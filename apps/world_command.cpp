@@ -23,7 +23,7 @@ struct WorldOptions {
   std::string group, name, to;
   bool is_list = false;
   std::string vertical;
-  std::optional<double> opacity, no_data;
+  std::optional<double> opacity, feather, no_data;
 };
 
 std::string absolute(const std::string& path) {
@@ -46,8 +46,8 @@ int list(const WorldOptions& options) {
   fmt::print("{}, {:.0f} x {:.0f} m; in each group the later lie over the earlier\n", world->planet, world->ellipsoid.a(), world->ellipsoid.b());
   for (std::size_t i = 0; i < world->layers.size(); ++i) {
     const globe::LayerSpec& layer = world->layers[i];
-    fmt::print("{:>3}  {:<18} {}{}{}\n     {}\n", i + 1, globe::name_of(layer.group), layer.name, layer.enabled ? "" : ", off",
-               layer.opacity < 1.0 ? fmt::format(", opacity {:g}", layer.opacity) : "", what_it_shows(layer));
+    fmt::print("{:>3}  {:<18} {}{}{}{}\n     {}\n", i + 1, globe::name_of(layer.group), layer.name, layer.enabled ? "" : ", off",
+               layer.opacity < 1.0 ? fmt::format(", opacity {:g}", layer.opacity) : "", layer.feather > 0.0 ? fmt::format(", feather {:g}", layer.feather) : "", what_it_shows(layer));
   }
   return kDone;
 }
@@ -74,6 +74,8 @@ Result<void> add_layers(globe::WorldText& text, const std::vector<globe::World>&
     if (!options.name.empty()) layer.name = options.name;
     if (const auto group = globe::group_by_name(options.group)) layer.group = *group;
     if (options.opacity) layer.opacity = *options.opacity;
+    if (options.feather) layer.feather = *options.feather;
+    if (const auto fine = globe::check(layer, layer.group); !fine) return {fine.error().code, fmt::format("{}: {}", layer.name, fine.error().message)};
     if (!options.vertical.empty()) layer.source.vertical = options.vertical;
     if (options.no_data) {
       const std::string& type = layer.source.type;
@@ -160,11 +162,12 @@ void add_world_files(CLI::App& app, Run& run) {
   group->check([](const std::string& word) { return globe::group_by_name(word) ? std::string() : fmt::format("no group is called \"{}\": see docs/world-file.md", word); });
   CLI::Option* name = adding->add_option("--name", options->name, "of the layer (default: the file's)");
   CLI::Option* opacity = adding->add_option("--opacity", options->opacity, "of the layer, 0 to 1")->check(CLI::Range(0.0, 1.0));
+  CLI::Option* feather = adding->add_option("--feather", options->feather, "pixels over which pictures fade in from their edges (0)")->check(CLI::Range(0.0, globe::kMostFeather))->type_name("PIXELS");
   CLI::Option* vertical = adding->add_option("--vertical", options->vertical, "what heights are above: ellipsoid, sphere, egm96 or a vertical CRS (default: what the data say)")->type_name("DATUM");
   CLI::Option* no_data = adding->add_option("--no-data", options->no_data, "the value of rasters that means nothing is there (default: their own)")->type_name("VALUE");
   CLI::Option* is_list = adding->add_flag("--list", options->is_list, "the data are lists of rasters (a VRT, an index of gdaltindex, STAC items): a catalogue of each");
   CLI::Option* to = adding->add_option("--to", options->to, "put the rasters into this catalogue (name or number) instead")->type_name("LAYER");
-  for (CLI::Option* other : {group, name, opacity, vertical, no_data, is_list}) to->excludes(other);
+  for (CLI::Option* other : {group, name, opacity, feather, vertical, no_data, is_list}) to->excludes(other);
 
   CLI::App* removing = sub("remove", "take layers out, or files that a catalogue lists", remove);
   removing->add_option("WORLD", options->world, "a world file")->required()->type_name("");
