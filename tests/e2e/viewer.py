@@ -309,7 +309,7 @@ class Picture(WindowTest):
         bad.write_text("no raster")
         viewer = self.open(ALPS, world=[file])
         beside = np.s_[:, 440:]  # of the panel of layers
-        remove, fly, save = (120, 250), (52, 250), (88, 92)
+        remove, fly, save = (120, 279), (52, 279), (88, 92)
 
         def click(point):
             viewer.do(*viewer.at(point), "sleep", HELD, "mousedown", 1, "sleep", HELD, "mouseup", 1)
