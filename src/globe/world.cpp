@@ -108,7 +108,7 @@ class WorldReader {
     }
     const std::string& type = layer.source.type;
     if (layer.source.time && layer.group == LayerGroup::height) fail(table, "heights have no `time`: only pictures change with it");
-    if (is_drawn_by_itself(type) && layer.group == LayerGroup::height) fail(table, fmt::format("a source of type \"{}\" is a picture: its group is \"color\"", type));
+    if (is_drawn_by_itself(type) && (layer.group == LayerGroup::height || layer.group == LayerGroup::normal)) fail(table, fmt::format("a source of type \"{}\" is a picture: its group is \"color\"", type));
     const std::string first_file = layer.source.catalogue.files.empty() ? "" : layer.source.catalogue.files.front();
     const std::string unnamed = type == "catalogue" && layer.source.path.empty() ? std::filesystem::path(first_file).stem().string() : !layer.source.url.empty() ? fetch::public_part(layer.source.url) : is_drawn_by_itself(type) ? type : layer.source.path.stem().string();
     layer.name = text(table, "name").value_or(unnamed);

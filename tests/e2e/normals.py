@@ -1,12 +1,14 @@
 """Normal maps shade coarse ground as the elevation that they were made of would; where the elevation is as fine, it does."""
 # label: slow
 # timeout: 300
+import subprocess
+import sys
 import unittest
 
 import numpy as np
 from osgeo import gdal
 
-from _common import EARTH, RAINIER, Case, read_picture, shared
+from _common import EARTH, RAINIER, ROOT, Case, read_picture, shared
 
 VIEW = (46.5, -121.5, 400_000, 0, -90)  # from so far that what is drawn too low or too high is not seen aside
 COARSER = 40  # of the heights that are drawn, in samples of the real ones
@@ -102,6 +104,19 @@ class Normals(Case):
         options = ("--no-lighting",)
         self.assertLessEqual(np.abs(self.picture("dark", self.folder / "coarse.tif", ("normals", ""), options=options)
                                 - self.picture("dark_coarse", self.folder / "coarse.tif", options=options)).max(), 1)
+
+    def test_the_guides_recipe(self):
+        """What docs/world-file.md says makes a normal map, of a DEM in UTM."""
+        guide = (ROOT / "docs/world-file.md").read_text()
+        recipe = guide[guide.index("**Normals.**"):].split("```python\n")[1].split("```")[0]
+        folder = self.folder / "recipe"
+        folder.mkdir()
+        gdal.Warp(str(folder / "dem.tif"), str(shared(RAINIER)), dstSRS="EPSG:32610", xRes=90, yRes=90, resampleAlg="bilinear", dstNodata=-32768).FlushCache()
+        subprocess.run([sys.executable, "-c", recipe], cwd=folder, check=True)
+        fine, coarse = self.picture("fine_too", shared(RAINIER)), self.picture("coarse_too", self.folder / "coarse.tif")
+        mapped = self.picture("recipe", self.folder / "coarse.tif", ("recipe/normals", ""))
+        print(f"recipe: {np.abs(mapped - fine).mean():.2f} of 255 from the picture of the fine heights")
+        self.assertLess(np.abs(mapped - fine).mean(), 0.35 * np.abs(coarse - fine).mean())
 
     def test_what_is_no_normal_map_is_told(self):
         world = self.world("heights", self.folder / "coarse.tif", ("coarse", ""))
