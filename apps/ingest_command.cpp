@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -33,6 +34,7 @@ void stop_on_interrupt() {
 double megabytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
 void print_report(const prepare::IngestReport& report, const std::filesystem::path& out, double seconds) {
+  if (report.measured) fmt::print("{}.errors: the error table\n", out.string());
   if (report.joined) {
     fmt::print("{}: {} x {} pixels, {} levels, {:.1f} MB; {} of {} chunks made in {:.1f} s\n", out.string(), report.width, report.height, report.levels, megabytes(report.file_bytes),
                report.chunks_made, report.chunks, seconds);
@@ -41,19 +43,23 @@ void print_report(const prepare::IngestReport& report, const std::filesystem::pa
   }
 }
 
-int run_ingest(const prepare::IngestOptions& options, bool remove_work) {
+/// Shows progress; ends the work when the user asks for it.
+prepare::IngestWatch watch_from(Clock::time_point start) {
   stop_on_interrupt();
-  const auto start = Clock::now();
-  std::unique_ptr<ProgressLine> line;
-  prepare::IngestProgress last;
-  const auto watch = [&](const prepare::IngestProgress& progress) {
+  return [start, line = std::shared_ptr<ProgressLine>(), measures = false](const prepare::IngestProgress& progress) mutable {
     constexpr double kPixelsOfUnit = 1e6;
-    if (!line) line = std::make_unique<ProgressLine>(static_cast<double>(progress.all_pixels) / kPixelsOfUnit, "megapixels", start);
-    last = progress;
+    if (!line || measures != progress.measures) {
+      measures = progress.measures;
+      line = std::make_shared<ProgressLine>(static_cast<double>(progress.all_pixels) / kPixelsOfUnit, measures ? "megapixels measured" : "megapixels", measures ? Clock::now() : start);
+    }
     line->show(static_cast<double>(progress.pixels) / kPixelsOfUnit, static_cast<double>(progress.bytes), progress.pixels == progress.all_pixels);
     return g_interrupted == 0;
   };
-  const auto report = prepare::ingest(options, watch);
+}
+
+int run_ingest(const prepare::IngestOptions& options, bool remove_work) {
+  const auto start = Clock::now();
+  const auto report = prepare::ingest(options, watch_from(start));
   if (!report) return apps::report(report.error());
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (options.shards > 1) {
@@ -68,11 +74,11 @@ int run_ingest(const prepare::IngestOptions& options, bool remove_work) {
   return kDone;
 }
 
-int run_merge(const std::vector<std::filesystem::path>& folders, const std::filesystem::path& out, int workers) {
+int run_merge(const prepare::MergeOptions& options) {
   const auto start = Clock::now();
-  const auto report = prepare::merge(folders, out, workers);
+  const auto report = prepare::merge(options, watch_from(start));
   if (!report) return apps::report(report.error());
-  print_report(*report, out, std::chrono::duration<double>(Clock::now() - start).count());
+  print_report(*report, options.out, std::chrono::duration<double>(Clock::now() - start).count());
   return kDone;
 }
 
@@ -104,18 +110,24 @@ std::string one_of(const char* option, const std::string& text, const std::vecto
 
 int default_workers() { return static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)); }
 
+void add_work_options(CLI::App& command, int& workers, std::size_t& memory_bytes, std::optional<bool>& error_table) {
+  command.add_option("--workers", workers, "threads (all cores)")->check(CLI::Range(1, 256))->type_name("N");
+  command.add_option_function<std::size_t>("--memory", [&memory_bytes](const std::size_t& mb) { memory_bytes = mb << 20; }, "bound of the memory used (1024)")
+      ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 20))->type_name("MB");
+  command.add_option_function<std::string>("--error-table", [&error_table](const std::string& text) {
+    const std::string word = one_of("--error-table", text, {"auto", "yes", "no"});
+    error_table = word == "auto" ? std::nullopt : std::optional(word == "yes");
+  }, "measure how far coarse heights are from these, and write it as FILE.tif.errors (auto: of more than 100 million)")->type_name("auto|yes|no");
+}
+
 void add_merge(CLI::App& ingest, Run& run) {
-  struct MergeOptions {
-    std::vector<std::filesystem::path> folders;
-    std::filesystem::path out;
-    int workers = default_workers();
-  };
-  auto options = std::make_shared<MergeOptions>();
+  auto options = std::make_shared<prepare::MergeOptions>();
+  options->workers = default_workers();
   CLI::App* command = ingest.add_subcommand("merge", "join what the shards have made");
   command->add_option("WORK", options->folders, "the folders of work of the shards (FILE.tif.work)")->type_name("");
   command->add_option("--out", options->out, "the GeoTIFF to write")->required()->check(has_ending(".tif"))->type_name("FILE.tif");
-  command->add_option("--workers", options->workers, "threads (all cores)")->check(CLI::Range(1, 256))->type_name("N");
-  command->callback([options, &run] { run = [options] { return run_merge(options->folders, options->out, options->workers); }; });
+  add_work_options(*command, options->workers, options->memory_bytes, options->error_table);
+  command->callback([options, &run] { run = [options] { return run_merge(*options); }; });
 }
 
 void add_format_options(CLI::App& command, prepare::IngestOptions& options) {
@@ -166,9 +178,7 @@ void add_ingest(CLI::App& app, Run& run) {
   command->add_option("--out", options.out, "the GeoTIFF to write; FILE.tif.work keeps what is done")->check(has_ending(".tif"))->type_name("FILE.tif");
   add_format_options(*command, options);
   add_repair_options(*command, options.repair);
-  command->add_option("--workers", options.workers, "threads (all cores)")->check(CLI::Range(1, 256))->type_name("N");
-  command->add_option_function<std::size_t>("--memory", [&options](const std::size_t& mb) { options.memory_bytes = mb << 20; }, "bound of the memory used (1024)")
-      ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 20))->type_name("MB");
+  add_work_options(*command, options.workers, options.memory_bytes, options.error_table);
   command->add_option_function<std::string>("--shard", [&options](const std::string& t) { set_shard(t, options); }, "make this share of the chunks and join nothing")->type_name("N/COUNT");
   command->add_flag("--remove-work", all->remove_work, "remove FILE.tif.work at the end; without it a change of an input later costs only what it touches");
   add_merge(*command, run);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace tellurion::geo {
 namespace {
@@ -40,6 +41,19 @@ std::optional<Body> find_body(std::string_view name) {
     if (std::ranges::equal(body.name, name, same)) return body;
   }
   return std::nullopt;
+}
+
+const Body* body_like(const Ellipsoid& ellipsoid) {
+  const Body* best = nullptr;
+  double least = 0.01;
+  for (const Body& body : kBodies) {
+    const double difference = std::abs(ellipsoid.a() / body.ellipsoid.a() - 1.0);
+    if (difference < least) {
+      least = difference;
+      best = &body;
+    }
+  }
+  return best;
 }
 
 }  // namespace tellurion::geo

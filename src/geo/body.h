@@ -22,4 +22,7 @@ std::span<const Body> bodies();
 /// The body of this name in any case of letters; nothing if unknown.
 std::optional<Body> find_body(std::string_view name);
 
+/// The known body whose equatorial radius is nearest, if it is within a hundredth; null otherwise.
+const Body* body_like(const Ellipsoid& ellipsoid);
+
 }  // namespace tellurion::geo

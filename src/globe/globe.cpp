@@ -80,7 +80,7 @@ struct Globe::State {
 
   mutable std::mutex mutex;  ///< guards what follows
   std::shared_ptr<const surface::SurfaceDescription> surface;
-  std::shared_ptr<const surface::ErrorTable> table;
+  std::shared_ptr<const surface::KnownErrors> errors;
   std::shared_ptr<const surface::SurfaceFacts> facts;
   std::vector<std::pair<std::shared_ptr<const surface::SurfaceDescription>, std::shared_ptr<const surface::SurfaceFacts>>> other_facts;  ///< of other times
   std::deque<OpenLayer> layers;        ///< stay where they are
@@ -174,11 +174,11 @@ void Globe::State::show(std::shared_ptr<const surface::SurfaceDescription> chang
     std::lock_guard lock(mutex);
     if (changed->revision <= surface->revision) return;
     surface = std::move(changed);
-    if (surface::table_revision(*surface) != tables->revision()) {
-      table = nullptr;
+    if (surface::errors_revision(*surface) != tables->revision()) {
+      errors = nullptr;
       begun = tables = make_tables();
     }
-    facts = surface::make_facts(surface, table);
+    facts = surface::make_facts(surface, errors);
     other_facts.clear();
   }
   if (!begun) return;
@@ -195,11 +195,11 @@ void Globe::State::show(std::shared_ptr<const surface::SurfaceDescription> chang
 /// Error tables for the heights as they are now. With the lock held.
 std::shared_ptr<HeightTables> Globe::State::make_tables() {
   return std::make_shared<HeightTables>(surface, blocks, options.cache_folder, *pool,
-                                        [this, revision = surface::table_revision(*surface)](std::shared_ptr<const surface::ErrorTable> found) {
+                                        [this, revision = surface::errors_revision(*surface)](std::shared_ptr<const surface::KnownErrors> found) {
     std::lock_guard lock(mutex);
     if (revision != tables->revision()) return;  // heights have changed since
-    table = std::move(found);
-    facts = surface::make_facts(surface, table);
+    errors = std::move(found);
+    facts = surface::make_facts(surface, errors);
     other_facts.clear();
   });
 }
@@ -631,7 +631,7 @@ std::shared_ptr<const surface::SurfaceFacts> Globe::facts_of(const std::shared_p
   const auto found = std::ranges::find(s.other_facts, surface, [](const auto& entry) { return entry.first; });
   if (found != s.other_facts.end()) return found->second;
   if (s.other_facts.size() >= SurfaceSteps::kHeldSurfaces) s.other_facts.erase(s.other_facts.begin());
-  s.other_facts.emplace_back(surface, surface::make_facts(surface, s.table));
+  s.other_facts.emplace_back(surface, surface::make_facts(surface, s.errors));
   return s.other_facts.back().second;
 }
 

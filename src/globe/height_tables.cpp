@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "surface/error_scan.h"
 #include "surface/error_table.h"
+#include "surface/prepared_table.h"
 
 namespace tellurion::globe {
 struct HeightTables::State {
@@ -22,6 +23,8 @@ struct HeightTables::State {
   Publish publish;
   std::filesystem::path file;  ///< empty: not kept
   std::string revision;
+  std::string scan_revision;   ///< of what is scanned
+  std::vector<surface::KnownErrors::OfRaster> prepared;  ///< written by load() alone
   std::stop_source stop;
   std::atomic<bool> loaded{false};  ///< or there was none to load
   std::atomic<bool> ready{false};
@@ -36,7 +39,22 @@ struct HeightTables::State {
   Result<surface::ElevationModel> take_model();
   void run(std::size_t job, const geo::TileKey& root);
   void finish();
+  void load_prepared();
+  void publish_all(std::shared_ptr<const surface::ErrorTable> table);
 };
+
+void HeightTables::State::load_prepared() {
+  for (const surface::Layer& layer : surface->heights) {
+    if (!surface::wants_prepared_table(*surface, layer)) continue;
+    auto table = surface::load_prepared_table(*layer.source, surface->ellipsoid);
+    if (table) prepared.push_back({layer.source, std::move(*table)});
+    else if (table.error().code != ErrorCode::not_found) log::warning(table.error().message);
+  }
+}
+
+void HeightTables::State::publish_all(std::shared_ptr<const surface::ErrorTable> table) {
+  publish(std::make_shared<const surface::KnownErrors>(surface::KnownErrors{std::move(table), prepared}));
+}
 
 Result<surface::ElevationModel> HeightTables::State::take_model() {
   {
@@ -81,9 +99,9 @@ void HeightTables::State::finish() {
     if (!file.empty()) {
       std::error_code failure;
       std::filesystem::create_directories(file.parent_path(), failure);
-      if (const auto saved = table->save(file, revision); !saved) log::warning(saved.error().message);
+      if (const auto saved = table->save(file, scan_revision); !saved) log::warning(saved.error().message);
     }
-    publish(std::move(table));
+    publish_all(std::move(table));
   }
   ready = true;
 }
@@ -97,21 +115,23 @@ HeightTables::HeightTables(std::shared_ptr<const surface::SurfaceDescription> su
   s.blocks = &blocks;
   s.pool = &pool;
   s.publish = std::move(publish);
-  s.revision = surface::table_revision(*s.surface);
-  if (!cache_folder.empty()) s.file = cache_folder / "tables" / fmt::format("{:016x}.errors", fnv1a(s.revision));
+  s.revision = surface::errors_revision(*s.surface);
+  s.scan_revision = surface::table_revision(*s.surface);
+  if (!cache_folder.empty()) s.file = cache_folder / "tables" / fmt::format("{:016x}.errors", fnv1a(s.scan_revision));
 }
 
 HeightTables::~HeightTables() { state_->stop.request_stop(); }
 
 void HeightTables::load(bool scan) {
   State& s = *state_;
-  if (!s.file.empty()) {
-    if (auto kept = surface::ErrorTable::load(s.file, s.revision)) {
-      s.publish(std::make_shared<const surface::ErrorTable>(std::move(*kept)));
-      s.ready = true;
-    }
-  }
-  if (!scan) s.ready = true;
+  s.load_prepared();
+  const bool all_prepared = std::ranges::all_of(s.surface->heights, [&](const surface::Layer& layer) {
+    return !layer.enabled || std::ranges::find(s.prepared, layer.source, &surface::KnownErrors::OfRaster::raster) != s.prepared.end();
+  });
+  auto kept = s.file.empty() || all_prepared ? Result<surface::ErrorTable>(Error{ErrorCode::not_found, ""}) : surface::ErrorTable::load(s.file, s.scan_revision);
+  if (kept) s.publish_all(std::make_shared<const surface::ErrorTable>(std::move(*kept)));
+  else if (!s.prepared.empty()) s.publish_all(nullptr);
+  if (kept || (all_prepared && !s.prepared.empty()) || !scan) s.ready = true;
   s.loaded = true;
 }
 

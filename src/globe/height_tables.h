@@ -1,4 +1,4 @@
-// The error tables of a surface's height layers: loaded if they were kept, else made in the background and kept.
+// The error tables of a surface's height layers: loaded if they were kept or lie beside a raster, else made in the background and kept.
 #pragma once
 
 #include <atomic>
@@ -10,23 +10,23 @@
 #include "cache/block_cache.h"
 #include "globe/worker_pool.h"
 #include "surface/elevation_model.h"
-#include "surface/error_table.h"
+#include "surface/surface_facts_made.h"
 
 namespace tellurion::globe {
 
 class HeightTables {
  public:
-  using Publish = std::function<void(std::shared_ptr<const surface::ErrorTable>)>;
+  using Publish = std::function<void(std::shared_ptr<const surface::KnownErrors>)>;
 
-  /// `publish` gets the table when it has been loaded or made, on any thread.
+  /// `publish` gets what is known when tables have been loaded or made, on any thread.
   /// `blocks` and `pool` outlive the jobs.
   HeightTables(std::shared_ptr<const surface::SurfaceDescription> surface, cache::BlockCache& blocks,
                std::filesystem::path cache_folder, WorkerPool& pool, Publish publish);
   ~HeightTables();
 
-  /// What the surface's heights are, as far as the table depends on them.
+  /// What the surface's heights are, as far as the tables depend on them.
   const std::string& revision() const;
-  /// Loads the table if it was kept; reads a file. With `scan` false the estimates stay otherwise.
+  /// Loads the tables that were kept or prepared; reads files. With `scan` false the estimates stay otherwise.
   void load(bool scan);
   /// Begins to make the table, once, if it was not kept; does not wait. Nothing before it was looked for.
   void begin_scan();

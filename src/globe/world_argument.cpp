@@ -16,20 +16,6 @@
 namespace tellurion::globe {
 namespace {
 
-/// The known body whose equatorial radius is nearest, if it is within a hundredth.
-const geo::Body* body_like(const geo::Ellipsoid& ellipsoid) {
-  const geo::Body* best = nullptr;
-  double least = 0.01;
-  for (const geo::Body& body : geo::bodies()) {
-    const double difference = std::abs(ellipsoid.a() / body.ellipsoid.a() - 1.0);
-    if (difference < least) {
-      least = difference;
-      best = &body;
-    }
-  }
-  return best;
-}
-
 LayerGroup group_of(source::SampleKind kind) {
   switch (kind) {
     case source::SampleKind::height: return LayerGroup::height;
@@ -49,7 +35,7 @@ Result<World> default_world() {
 Result<World> world_of_raster(const std::filesystem::path& file) {
   const auto raster = source::body_of_raster(file);
   if (!raster) return raster.error();
-  const geo::Body* body = body_like(raster->ellipsoid);
+  const geo::Body* body = geo::body_like(raster->ellipsoid);
   World world;
   world.planet = body ? std::string(body->name) : "unknown body";
   world.ellipsoid = raster->ellipsoid;

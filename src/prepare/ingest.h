@@ -45,11 +45,14 @@ struct IngestOptions {
   int block = 512;
   std::size_t memory_bytes = std::size_t{1} << 30;
   int workers = 1;
+  std::optional<bool> error_table{};     ///< beside the output (surface/prepared_table.h); nothing: for heights too large to be scanned when they are shown
   int shard = 0;                         ///< this one of `shards`; of more than one none joins
   int shards = 1;
 };
 
+/// Of what is done now: chunks, then the error table.
 struct IngestProgress {
+  bool measures = false;    ///< the error table
   std::uint64_t pixels = 0;
   std::uint64_t all_pixels = 0;
   std::uint64_t bytes = 0;  ///< of samples read
@@ -62,6 +65,7 @@ struct IngestReport {
   int height = 0;
   int levels = 0;
   bool joined = false;    ///< the output was written; else it was there already, or this is a shard
+  bool measured = false;  ///< the error table likewise
   std::uint64_t file_bytes = 0;
 };
 
@@ -75,8 +79,15 @@ std::filesystem::path work_folder(const std::filesystem::path& out);
 /// unavailable (what cannot be written or read now), exhausted (the memory's bound is too small), cancelled.
 Result<IngestReport> ingest(const IngestOptions& options, const IngestWatch& watch);
 
-/// Joins the chunks that lie in `folders` (nothing: the output's own work folder) into `out`.
-/// Errors: as above; not_found, naming the shards' chunks that are missing.
-Result<IngestReport> merge(std::vector<std::filesystem::path> folders, const std::filesystem::path& out, int workers);
+struct MergeOptions {
+  std::vector<std::filesystem::path> folders{};  ///< nothing: the output's own work folder
+  std::filesystem::path out;
+  std::optional<bool> error_table{};     ///< as of IngestOptions
+  std::size_t memory_bytes = std::size_t{1} << 30;
+  int workers = 1;
+};
+
+/// Joins the chunks of all folders. Errors: as above; not_found, naming the shards' chunks that are missing.
+Result<IngestReport> merge(const MergeOptions& options, const IngestWatch& watch);
 
 }  // namespace tellurion::prepare

@@ -19,12 +19,14 @@
 #include "surface/rtin.h"
 #include "surface/tile_grid.h"
 #include "surface/tile_samples.h"
+#include "surface/whole_cover.h"
 
 namespace tellurion::surface {
 namespace {
 
 constexpr int kJobLevel = 2;
 constexpr int kJobsPerFace = 1 << (2 * kJobLevel);
+constexpr double kMostSamplesOfPart = 4e6;
 constexpr int kRun = 16;  ///< samples of a row that are left out together
 
 /// The surface between samples is compared where those round it are off by this share of the worst so far, up to a quarter of
@@ -32,7 +34,7 @@ constexpr int kRun = 16;  ///< samples of a row that are left out together
 constexpr double kWorthALook = 0.4;
 constexpr double kBetweenPlaces = 1.15;
 
-constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), {}};
+constexpr TileRecord kNothingYet{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), {}, 0};
 
 void include(TileRecord& record, const TileRecord& part) {
   record.min_height = std::min(record.min_height, part.min_height);
@@ -46,15 +48,61 @@ bool is_leaf(const SurfaceDescription& description, const geo::TileKey& key) {
          key.level >= geo::kMaxTileLevel;
 }
 
+void include(OpenRecord& all, const OpenRecord& part) {
+  include(all.record, part.record);
+  all.worst = std::max(all.worst, part.worst);
+  all.tally.add(part.tally, 1.0);
+}
+
+TileRecord finished(const OpenRecord& tile) {
+  TileRecord record = tile.record;
+  const auto rounded_up = [](double metres) { return metres > 0.0 ? std::nextafter(static_cast<float>(metres), INFINITY) : 0.0f; };
+  const double bound = kBetweenPlaces * tile.worst;
+  record.error = larger(record.error, {rounded_up(bound), rounded_up(std::min(tile.tally.common(), bound))});
+  return record;
+}
+
+/// What the four children of a node say of it.
+void include_children(RecordTree& tree, std::size_t node) {
+  const std::size_t first = tree[node].children;
+  if (first == 0) return;
+  TileRecord& record = tree[node].record;
+  record.whole = 1;
+  for (std::size_t i = 0; i < 4; ++i) {
+    include(record, tree[first + i].record);
+    record.whole &= tree[first + i].record.whole;
+  }
+}
+
+/// Puts a subtree in the place of a leaf: its root takes the place that is there, all that follow move up behind what the tree holds.
+void graft(RecordTree& tree, std::size_t node, const RecordTree& subtree) {
+  const auto shift = static_cast<std::uint32_t>(tree.size() - 1);
+  for (std::size_t i = 0; i < subtree.size(); ++i) {
+    RecordTree::Node moved = subtree[i];
+    if (moved.children != 0) moved.children += shift;
+    if (i == 0) {
+      tree[node] = moved;
+    } else {
+      tree.nodes().push_back(moved);
+    }
+  }
+}
+
+/// The node of a child, with all four made if they are not there.
+std::size_t child_node(RecordTree& tree, std::size_t node, const geo::TileKey& child) {
+  if (tree[node].children == 0) {
+    const std::size_t first = tree.add_children(node);
+    for (std::size_t i = 0; i < 4; ++i) tree[first + i].record = kNothingYet;
+  }
+  return tree[node].children + static_cast<std::size_t>(geo::child_index(child));
+}
+
 /// A tile of the path from a root to the leaf being scanned, with its grid.
-struct OnPath {
+struct OnPath : OpenRecord {
   geo::TileKey key;
   geo::FaceRect rect;
   double steps_per_unit = 0.0;  ///< of the grid, per unit of face coordinates
   std::vector<double> heights;
-  TileRecord record = kNothingYet;
-  double worst = 0.0;  ///< largest distance so far between the data and the grid
-  DeviationTally tally;    ///< of evenly spread places, by the area of the leaves
   DeviationTally in_leaf;  ///< of the leaf being scanned, each as one
 
   /// The distance at a place. `slack`: how far the surface may be from `metres` round there.
@@ -85,20 +133,21 @@ class Scanner {
  public:
   Scanner(ElevationModel& model, std::stop_token stop) : model_(model), stop_(std::move(stop)) {}
 
-  Result<SubtreeScan> run(const geo::TileKey& root) {
-    SubtreeScan scan;
+  Result<PartScan> run(const geo::TileKey& root) {
+    PartScan scan;
     scan.root = root;
     for (int level = 0; level < root.level; ++level) {
       if (Result<void> pushed = push(geo::ancestor(root, level)); !pushed) return pushed.error();
     }
     if (Result<void> done = descend(root, scan.tree, 0); !done) return done.error();
-    for (OnPath& tile : path_) scan.above.push_back(finished(tile));
+    for (OnPath& tile : path_) scan.above.push_back(std::move(tile));
     return scan;
   }
 
  private:
   Result<void> push(const geo::TileKey& key) {
     OnPath tile;
+    tile.record = kNothingYet;
     tile.key = key;
     tile.rect = geo::face_rect(key);
     tile.steps_per_unit = (kGridSide - 1) / (tile.rect.upper.x - tile.rect.lower.x);
@@ -119,20 +168,12 @@ class Scanner {
       for (int i = 0; i < 4; ++i) {
         const std::size_t child = children + static_cast<std::size_t>(i);
         if (Result<void> done = descend(geo::child(key, i), tree, child); !done) return done;
-        include(path_.back().record, tree[child].record);
       }
     }
     tree[node].record = finished(path_.back());
+    include_children(tree, node);
     path_.pop_back();
     return {};
-  }
-
-  static TileRecord finished(const OnPath& tile) {
-    TileRecord record = tile.record;
-    const auto rounded_up = [](double metres) { return metres > 0.0 ? std::nextafter(static_cast<float>(metres), INFINITY) : 0.0f; };
-    const double bound = kBetweenPlaces * tile.worst;
-    record.error = larger(record.error, {rounded_up(bound), rounded_up(std::min(tile.tally.common(), bound))});
-    return record;
   }
 
   Result<void> scan_leaf() {
@@ -143,6 +184,9 @@ class Scanner {
     const bool finer_than_data = nominal_grid_spacing(model_.description().ellipsoid, leaf.key.level) <= 0.75 * finest;
     const Result<void> scanned = finer_than_data ? compare_fine_grid() : compare_samples();
     if (!scanned) return scanned;
+    const Result<bool> whole = is_covered_by_one(model_, leaf.key);
+    if (!whole) return whole.error();
+    leaf.record.whole = *whole ? 1 : 0;
     for (OnPath& tile : path_) {
       const double count = tile.in_leaf.count();
       if (count > 0.0) tile.tally.add(tile.in_leaf, std::ldexp(1.0, -2 * leaf.key.level) / count);
@@ -366,6 +410,11 @@ bool is_scanned(const Layer& layer) {
   return layer.enabled && !layer.source->description().is_remote && static_cast<double>(size.width) * size.height <= kMostScannedSamples;
 }
 
+bool wants_prepared_table(const SurfaceDescription& description, const Layer& layer) {
+  if (!layer.enabled || layer.catalogue || layer.source->description().is_remote) return false;
+  return !is_scanned(layer) || std::ranges::count_if(description.heights, &Layer::enabled) == 1;
+}
+
 double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
   double finest = std::numeric_limits<double>::infinity();
   for (const Layer& layer : layers) {
@@ -375,11 +424,19 @@ double finest_spacing(std::span<const Layer> layers, const geo::TileKey& key) {
 }
 
 std::string table_revision(const SurfaceDescription& description) {
-  std::string revision = "bound and common error, borders too, grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
+  std::string revision = std::string(kTableRules) + ", grid " + std::to_string(kGridSide) + "\n" + std::to_string(description.ellipsoid.a()) + " " + std::to_string(description.ellipsoid.b());
   for (const Layer& layer : description.heights) {
     if (!is_scanned(layer)) continue;
     revision += layer.adds ? "\n+" : "\n=";
     revision += layer.source->revision();
+  }
+  return revision;
+}
+
+std::string errors_revision(const SurfaceDescription& description) {
+  std::string revision = table_revision(description);
+  for (const Layer& layer : description.heights) {
+    if (wants_prepared_table(description, layer)) revision += "\n*" + layer.source->revision();
   }
   return revision;
 }
@@ -403,7 +460,46 @@ std::vector<geo::TileKey> scan_jobs() {
 }
 
 Result<SubtreeScan> scan_subtree(ElevationModel& model, const geo::TileKey& root, std::stop_token stop) {
+  const Result<PartScan> all = scan_part(model, root, std::move(stop));
+  if (!all) return all.error();
+  JobMerge merge(root);
+  merge.add(*all);
+  return std::move(merge).finish();
+}
+
+std::vector<geo::TileKey> parts_of_job(const SurfaceDescription& description, const geo::TileKey& root) {
+  const double side = nominal_tile_size(description.ellipsoid, root.level) / finest_spacing(description.heights, root);
+  if (side * side <= kMostSamplesOfPart || is_leaf(description, root)) return {root};
+  std::vector<geo::TileKey> parts;
+  for (int i = 0; i < 4; ++i) {
+    const std::vector<geo::TileKey> more = parts_of_job(description, geo::child(root, i));
+    parts.insert(parts.end(), more.begin(), more.end());
+  }
+  return parts;
+}
+
+Result<PartScan> scan_part(ElevationModel& model, const geo::TileKey& root, std::stop_token stop) {
   return Scanner(model, std::move(stop)).run(root);
+}
+
+JobMerge::JobMerge(const geo::TileKey& root) : root_(root), above_(root.level, OpenRecord{kNothingYet, 0.0, {}}) { tree_[0].record = kNothingYet; }
+
+void JobMerge::add(const PartScan& part) {
+  for (std::size_t level = 0; level < above_.size(); ++level) include(above_[level], part.above[level]);
+  std::size_t node = 0;
+  for (int level = root_.level; level < part.root.level; ++level) {
+    include(inner_.try_emplace(node, OpenRecord{kNothingYet, 0.0, {}}).first->second, part.above[static_cast<std::size_t>(level)]);
+    node = child_node(tree_, node, geo::ancestor(part.root, level + 1));
+  }
+  graft(tree_, node, part.tree);
+}
+
+SubtreeScan JobMerge::finish() && {
+  for (const auto& [node, found] : inner_) tree_[node].record = finished(found);
+  for (auto entry = inner_.rbegin(); entry != inner_.rend(); ++entry) include_children(tree_, entry->first);  // children come after parents
+  SubtreeScan scan{root_, std::move(tree_), {}};
+  for (const OpenRecord& tile : above_) scan.above.push_back(finished(tile));
+  return scan;
 }
 
 ErrorTable merge_scans(std::span<const SubtreeScan> scans) {
@@ -414,28 +510,12 @@ ErrorTable merge_scans(std::span<const SubtreeScan> scans) {
     for (int level = 0; level < scan.root.level; ++level) {
       include(tree[node].record, scan.above[static_cast<std::size_t>(level)]);
       include(tree[node].record, scan.tree[0].record);
-      if (tree[node].children == 0) {
-        const std::size_t first = tree.add_children(node);
-        for (std::size_t i = 0; i < 4; ++i) tree[first + i].record = kNothingYet;
-      }
-      node = tree[node].children + static_cast<std::size_t>(geo::child_index(geo::ancestor(scan.root, level + 1)));
+      node = child_node(tree, node, geo::ancestor(scan.root, level + 1));
     }
-    // The subtree's own root takes the place that is there; all that follow move up behind what the table already holds.
-    const auto shift = static_cast<std::uint32_t>(tree.size() - 1);
-    for (std::size_t i = 0; i < scan.tree.size(); ++i) {
-      RecordTree::Node moved = scan.tree[i];
-      if (moved.children != 0) moved.children += shift;
-      if (i == 0) {
-        tree[node] = moved;
-      } else {
-        tree.nodes().push_back(moved);
-      }
-    }
+    graft(tree, node, scan.tree);
   }
   // The levels above the jobs' roots know only what lies below them.
-  for (std::size_t node = tree.size(); node-- > 0;) {
-    for (std::size_t i = 0; tree[node].children != 0 && i < 4; ++i) include(tree[node].record, tree[tree[node].children + i].record);
-  }
+  for (std::size_t node = tree.size(); node-- > 0;) include_children(tree, node);
   return ErrorTable(std::move(tree));
 }
 

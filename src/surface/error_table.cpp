@@ -13,7 +13,7 @@ namespace tellurion::surface {
 namespace {
 
 /// Also tells another byte order and another version of the format apart.
-constexpr std::uint64_t kMagic = 0x31'65'6c'62'61'74'6c'74;
+constexpr std::uint64_t kMagic = 0x32'65'6c'62'61'74'6c'74;
 
 std::uint64_t checksum_of(std::span<const char> bytes) {  // FNV-1a
   std::uint64_t sum = 0xcbf29ce484222325ull;

@@ -19,6 +19,7 @@ struct TileRecord {
   float min_height = 0;  ///< metres above the ellipsoid, of the finest data
   float max_height = 0;
   HeightError error;     ///< of the tile's own full grid, at least that of every tile below
+  std::uint32_t whole = 0;  ///< 1: the only raster of the table is known to cover all of the tile, so that layers below do not show
 
   friend bool operator==(const TileRecord&, const TileRecord&) = default;
 };

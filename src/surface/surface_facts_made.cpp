@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,21 +22,27 @@ constexpr double kTexelsPerSample = 2.0;
 
 class MadeFacts final : public SurfaceFacts {
  public:
-  MadeFacts(std::shared_ptr<const SurfaceDescription> description, std::shared_ptr<const ErrorTable> table)
-      : description_(std::move(description)), table_(std::move(table)) {}
+  MadeFacts(std::shared_ptr<const SurfaceDescription> description, std::shared_ptr<const KnownErrors> errors)
+      : description_(std::move(description)), errors_(std::move(errors)), table_(errors_ ? errors_->scanned : nullptr) {}
 
   TileFacts facts_of(const geo::TileKey& key) const override {
     const geo::Ellipsoid& ellipsoid = description_->ellipsoid;
     TileFacts facts;
     bool assumed = false;
     double finest_height = std::numeric_limits<double>::infinity();
+    const Layer* uppermost = nullptr;
+    int touching = 0;
     for (const Layer& layer : description_->heights) {
       if (!layer.enabled || !coverage_of(layer).touches(key)) continue;
       finest_height = std::min(finest_height, coverage_of(layer).spacing_under(key).value);
       assumed = assumed || !table_ || !is_scanned(layer);
+      uppermost = &layer;
+      ++touching;
     }
-    if (table_) {
-      const ErrorTable::Found found = table_->find(key);
+    const std::optional<ErrorTable::Found> prepared = find_prepared(uppermost, touching == 1, key);
+    assumed = assumed && !prepared;
+    if (prepared || table_) {
+      const ErrorTable::Found found = prepared ? *prepared : table_->find(key);
       facts.min_height = found.record.min_height;
       facts.max_height = found.record.max_height;
       if (found.own) facts.height_error = found.record.error;
@@ -69,15 +76,26 @@ class MadeFacts final : public SurfaceFacts {
   }
 
  private:
+  /// What the table of the uppermost raster alone says, where nothing else shows.
+  std::optional<ErrorTable::Found> find_prepared(const Layer* uppermost, bool is_alone, const geo::TileKey& key) const {
+    if (!errors_ || uppermost == nullptr || !uppermost->source) return std::nullopt;
+    const auto of = std::ranges::find(errors_->prepared, uppermost->source, &KnownErrors::OfRaster::raster);
+    if (of == errors_->prepared.end()) return std::nullopt;
+    const ErrorTable::Found found = of->table.find(key);
+    const bool hides_all = found.record.whole != 0 && !uppermost->adds;
+    return is_alone || hides_all ? std::optional(found) : std::nullopt;
+  }
+
   std::shared_ptr<const SurfaceDescription> description_;
+  std::shared_ptr<const KnownErrors> errors_;
   std::shared_ptr<const ErrorTable> table_;
 };
 
 }  // namespace
 
 std::shared_ptr<const SurfaceFacts> make_facts(std::shared_ptr<const SurfaceDescription> description,
-                                               std::shared_ptr<const ErrorTable> table) {
-  return std::make_shared<MadeFacts>(std::move(description), std::move(table));
+                                               std::shared_ptr<const KnownErrors> errors) {
+  return std::make_shared<MadeFacts>(std::move(description), std::move(errors));
 }
 
 }  // namespace tellurion::surface

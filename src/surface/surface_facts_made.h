@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "surface/elevation_model.h"
 #include "surface/error_table.h"
@@ -18,9 +19,20 @@ inline constexpr double kAssumedSlope = 1.0;
 inline constexpr float kAssumedMinHeight = -12000.0f;
 inline constexpr float kAssumedMaxHeight = 22000.0f;
 
-/// `table` of all scanned layers of `description`; null: not there yet, assumptions stand in for it. Layers that are not scanned
-/// always rest on assumptions.
+/// What tables say of a surface's heights.
+struct KnownErrors {
+  /// The table of one raster alone, which lay beside it. It holds wherever that raster is all that shows.
+  struct OfRaster {
+    std::shared_ptr<const source::RasterSource> raster;
+    ErrorTable table;
+  };
+  std::shared_ptr<const ErrorTable> scanned;  ///< of all scanned layers; null: not there yet
+  std::vector<OfRaster> prepared{};
+};
+
+/// `errors` of `description`; null: nothing is there yet. Where no table tells, assumptions stand in for it: under layers that are neither
+/// scanned nor prepared always, and where a prepared one ends or has voids above others.
 std::shared_ptr<const SurfaceFacts> make_facts(std::shared_ptr<const SurfaceDescription> description,
-                                               std::shared_ptr<const ErrorTable> table);
+                                               std::shared_ptr<const KnownErrors> errors);
 
 }  // namespace tellurion::surface

@@ -65,7 +65,7 @@ TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, 
   CAPTURE(seed);
   MadeWorld world({layer_of(rough_globe(seed), 1), layer_of(rough_region(seed), 2)});
   const auto table = std::make_shared<ErrorTable>(merge_scans(scans_of(world)));
-  const auto facts = make_facts(world.description, table);
+  const auto facts = make_facts(world.description, std::make_shared<KnownErrors>(KnownErrors{table}));
   std::mt19937_64 random(seed);
   std::vector<double> ratios;
   int deepest = 0;

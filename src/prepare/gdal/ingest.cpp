@@ -19,6 +19,7 @@
 #include "prepare/gdal/chunk_worker.h"
 #include "prepare/gdal/inputs.h"
 #include "prepare/gdal/join.h"
+#include "prepare/gdal/output_errors.h"
 #include "prepare/parallel.h"
 #include "prepare/work_lock.h"
 #include "source/gdal/gdal_runtime.h"
@@ -89,6 +90,15 @@ Result<IngestReport> join(const OutputPlan& plan, const std::vector<fs::path>& f
   if (Result<void> kept = write_whole(folders.front() / kJoinedFile, joined_text(plan, out)); !kept) return kept.error();
   report.joined = true;
   report.file_bytes = *bytes;
+  return report;
+}
+
+/// The error table of what has been joined.
+Result<IngestReport> measure(const fs::path& out, const fs::path& folder, std::optional<bool> wanted, std::size_t memory_bytes, int workers, const IngestWatch& watch, IngestReport report) {
+  const std::size_t left = memory_bytes - std::min(memory_bytes, kProgramBytes);
+  const Result<bool> made = make_error_table(out, folder, {wanted, left, workers}, watch);
+  if (!made) return made.error();
+  report.measured = *made;
   return report;
 }
 
@@ -167,7 +177,9 @@ Result<IngestReport> ingest(const IngestOptions& options, const IngestWatch& wat
   std::error_code error;
   if (options.shards == 1 && is_joined(plan, options.out, folder)) {
     report.file_bytes = fs::file_size(options.out, error);
-    return report;
+    const Result<WorkLock> lock = WorkLock::whole(folder);
+    if (!lock) return lock.error();
+    return measure(options.out, folder, options.error_table, options.memory_bytes, options.workers, watch, report);
   }
   const Result<int> workers = affordable_workers(*mosaic, options);
   if (!workers) return workers.error();
@@ -182,12 +194,15 @@ Result<IngestReport> ingest(const IngestOptions& options, const IngestWatch& wat
   report.chunks_made = static_cast<int>(wanted.size());
   if (Result<void> made = make_chunks(*mosaic, wanted, *workers, folder, watch); !made) return made.error();
   if (options.shards > 1) return report;
-  Result<IngestReport> joined = join(plan, {folder}, options.out, *workers, report);
-  if (joined) remove_stale(plan, folder);
-  return joined;
+  const Result<IngestReport> joined = join(plan, {folder}, options.out, *workers, report);
+  if (!joined) return joined;
+  remove_stale(plan, folder);
+  return measure(options.out, folder, options.error_table, options.memory_bytes, options.workers, watch, *joined);
 }
 
-Result<IngestReport> merge(std::vector<fs::path> folders, const fs::path& out, int workers) {
+Result<IngestReport> merge(const MergeOptions& options, const IngestWatch& watch) {
+  const fs::path& out = options.out;
+  std::vector<fs::path> folders = options.folders;
   if (folders.empty()) folders.push_back(work_folder(out));
   source::configure_gdal(kLeastCacheBytes);
   std::string text;
@@ -208,9 +223,12 @@ Result<IngestReport> merge(std::vector<fs::path> folders, const fs::path& out, i
   if (is_joined(*plan, out, folders.front())) {
     std::error_code error;
     report.file_bytes = fs::file_size(out, error);
-    return report;
+  } else {
+    const Result<IngestReport> joined = join(*plan, folders, out, options.workers, report);
+    if (!joined) return joined;
+    report = *joined;
   }
-  return join(*plan, folders, out, workers, report);
+  return measure(out, folders.front(), options.error_table, options.memory_bytes, options.workers, watch, report);
 }
 
 }  // namespace tellurion::prepare
