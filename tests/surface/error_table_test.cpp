@@ -138,6 +138,84 @@ TEST_CASE("merge_scans: the table is the same whichever worker does what, in wha
   }
 }
 
+TEST_CASE("JobMerge: parts find what a job finds of all at once") {
+  MadeWorld world({layer_of(rough_region(8), 1)});
+  const geo::TileKey deep = geo::tile_at(geo::normal_at(at(46, 8)), 6);
+  const geo::TileKey root = geo::ancestor(deep, 2);
+  const auto whole = scan_subtree(*world.model, root);
+  REQUIRE(whole);
+  std::vector<geo::TileKey> parts{root};
+  const auto split = [&](const geo::TileKey& key) {
+    const auto at_key = std::find(parts.begin(), parts.end(), key);
+    REQUIRE(at_key != parts.end());
+    const auto place = at_key - parts.begin();
+    parts.erase(at_key);
+    for (int i = 0; i < 4; ++i) parts.insert(parts.begin() + place + i, geo::child(key, i));
+  };
+  for (int level = 2; level < 5; ++level) split(geo::ancestor(deep, level));
+  JobMerge merge(root);
+  for (const geo::TileKey& part : parts) merge.add(std::move(scan_part(*world.model, part)).value());
+  const SubtreeScan merged = std::move(merge).finish();
+  REQUIRE(merged.tree.size() == whole->tree.size());
+  CHECK(merged.above == whole->above);
+  const auto same = [&](const auto& self, std::size_t one, std::size_t other) -> void {
+    CHECK(merged.tree[one].record == whole->tree[other].record);
+    REQUIRE((merged.tree[one].children == 0) == (whole->tree[other].children == 0));
+    for (std::size_t i = 0; merged.tree[one].children != 0 && i < 4; ++i) self(self, merged.tree[one].children + i, whole->tree[other].children + i);
+  };
+  same(same, 0, 0);
+  CHECK(merged.tree[0].record.error.common > 100);
+  CHECK(merged.tree[0].record.error.common < merged.tree[0].record.error.bound);
+}
+
+TEST_CASE("parts_of_job: no part is much larger than the others, together they are the job") {
+  SurfaceDescription description;
+  description.ellipsoid = geo::kWgs84;
+  CHECK(parts_of_job(description, {0, 2, 0, 0}) == std::vector<geo::TileKey>{{0, 2, 0, 0}});
+  MadeRaster large;
+  large.width = 40000, large.height = 20000;
+  description.heights = {layer_of(large, 1)};
+  const auto parts = parts_of_job(description, {1, 2, 3, 0});
+  CHECK(parts.size() == 4);
+  for (const geo::TileKey& part : parts) CHECK(geo::parent(part) == geo::TileKey{1, 2, 3, 0});
+}
+
+TEST_CASE("make_facts: a large raster rests on its own table where nothing else shows, on assumptions elsewhere") {
+  MadeRaster large = rough_region(9);
+  large.width = large.height = 12000;
+  const Layer base = layer_of(rough_globe(9), 1), region = layer_of(large, 2);
+  REQUIRE(!is_scanned(region));
+  const geo::TileKey deep = geo::tile_at(geo::normal_at(at(46, 8)), 9), sibling = geo::child(geo::parent(deep), (geo::child_index(deep) + 1) % 4);
+  RecordTree tree(geo::kFaceCount);
+  std::size_t node = deep.face;
+  for (int level = 1; level <= deep.level; ++level) node = tree.add_children(node) + static_cast<std::size_t>(geo::child_index(geo::ancestor(deep, level)));
+  tree[node].record = {100, 200, {3, 2}, 1};
+  auto description = std::make_shared<SurfaceDescription>();
+  description->ellipsoid = geo::kWgs84;
+  description->heights = {base, region};
+  CHECK(wants_prepared_table(*description, region));
+  CHECK(!wants_prepared_table(*description, base));
+  const auto errors = std::make_shared<KnownErrors>(KnownErrors{nullptr, {{region.source, ErrorTable(tree)}}});
+  const auto own = [&](const geo::TileKey& key) {
+    const TileFacts known = make_facts(description, errors)->facts_of(key);
+    return !known.assumed && known.min_height == 100 && known.max_height == 200 && known.height_error == HeightError{3, 2};
+  };
+  CHECK(own(deep));
+  CHECK(!make_facts(description, errors)->facts_of(geo::child(deep, 0)).assumed);
+  CHECK(make_facts(description, errors)->facts_of(sibling).assumed);  // not known to be whole: the base shows
+  CHECK(make_facts(description, nullptr)->facts_of(deep).assumed);
+  description->heights[1].adds = true;
+  CHECK(!own(deep));
+  description->heights = {region, base};  // hidden
+  CHECK(!own(deep));
+  description->heights = {region};
+  CHECK(own(deep));
+  CHECK(!make_facts(description, errors)->facts_of(sibling).assumed);
+  const std::string before = errors_revision(*description);
+  description->heights[0].enabled = false;
+  CHECK(errors_revision(*description) != before);
+}
+
 TEST_CASE("save, load: the same table comes back; anything wrong with the file is corrupt, never a crash") {
   MadeWorld world({layer_of(rough_globe(6), 1)});
   const ErrorTable table = merge_scans(scans_of(world));
