@@ -1,6 +1,7 @@
 """`tellurion ingest`: what it writes is what GDAL would, and the same whatever happened on the way."""
 # label: slow
 # timeout: 900
+import json
 import os
 import pathlib
 import re
@@ -259,6 +260,92 @@ class Restart(IngestCase):
         done = subprocess.run(["/usr/bin/python3", "-c", script, *command], check=True, capture_output=True, text=True)
         self.assertLess(int(done.stdout.split("kB")[1]), 256 * 1024)
         self.same(out)
+
+
+class ErrorTable(IngestCase):
+    """FILE.tif.errors: a raster that has one is shown without being read as a whole first."""
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.out = cls.folder / "table.tif"
+        cls.table = cls.folder / "table.tif.errors"
+        cls.source = write_raster(cls.folder / "ground.tif", hills(2600, 2600), transform=(10, 0.001, 0, 50, 0, -0.001))
+        subprocess.run([PROGRAM, "ingest", str(cls.source), "--out", str(cls.out), "--vertical", "ellipsoid", "--error-table", "yes"], check=True, capture_output=True)
+        cls.world = cls.folder / "table.toml"
+        cls.world.write_text('[planet]\nname = "Earth"\n[[layer]]\nname = "ground"\ngroup = "height"\nsource = { type = "gdal", path = "table.tif" }\n')
+
+    def shown(self, name):
+        """The picture, what was read for it, what was told, and the tables that were kept."""
+        picture, stats, cache = (self.folder / f"{name}{ending}" for ending in (".png", ".json", ".cache"))
+        done = self.tellurion("render", self.world, "--out", picture, "--camera", "48.4,11.3,60000,0,-40", "--size", "320x180", "--disk-cache", cache, "--stats", stats)
+        source, = json.loads(stats.read_text())["sources"]
+        return picture.read_bytes(), source["bytes"], done.stderr, list(cache.glob("tables/*"))
+
+    def test_the_picture_is_the_same_and_only_what_it_shows_is_read(self):
+        with_table, few, told, kept = self.shown("with")
+        self.assertEqual((told, kept), ("", []))
+        hidden = self.table.rename(self.folder / "hidden")
+        try:
+            without, all_bytes, told, kept = self.shown("without")
+        finally:
+            hidden.rename(self.table)
+        self.assertEqual((told, len(kept)), ("", 1))  # it was scanned
+        self.assertEqual(with_table, without)
+        self.assertGreater(all_bytes, 4 * 2600 * 2600)
+        self.assertLess(few, all_bytes / 2)
+
+    def test_a_table_of_other_data_is_told_of_and_left_out(self):
+        right = self.table.read_bytes()
+        picture = self.shown("right")[0]
+        for wrong in (right[:-1], right[:len(right) // 2] + b"?" + right[len(right) // 2 + 1:], b""):
+            self.table.write_bytes(wrong)
+            try:
+                as_scanned, _, told, kept = self.shown(f"wrong{len(wrong)}")
+            finally:
+                self.table.write_bytes(right)
+            self.assertIn("table.tif.errors is not used", told)
+            self.assertIn("--error-table yes", told)
+            self.assertEqual((as_scanned, len(kept)), (picture, 1))
+
+    def test_it_goes_with_the_file_and_ends_with_it(self):
+        there = self.folder / "there"
+        there.mkdir()
+        for file in (self.out, self.table):
+            shutil.copy(file, there / file.name)
+        world, self.world = self.world, there / "table.toml"
+        shutil.copy(world, self.world)
+        try:
+            self.assertEqual(self.shown("copied")[2:], ("", []))
+            # GDAL changes one sample in place.
+            raster = gdal.OpenEx(str(there / "table.tif"), gdal.OF_RASTER | gdal.OF_UPDATE, open_options=["IGNORE_COG_LAYOUT_BREAK=YES"])
+            raster.GetRasterBand(1).WriteArray(np.full((1, 1), 4000, np.float32), 1300, 1300)
+            raster = None
+            self.assertIn("is not used", self.shown("changed")[2])
+        finally:
+            self.world = world
+
+    def test_a_kill_while_it_is_made_changes_nothing(self):
+        out = self.folder / "killed-table.tif"
+        command = [PROGRAM, "ingest", str(self.source), "--out", str(out), "--vertical", "ellipsoid", "--error-table", "yes", "--workers", "1"]
+        program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for _ in range(3000):
+            if len(list(pathlib.Path(f"{out}.work").glob("*.scan"))) > 10 or program.poll() is not None:
+                break
+            time.sleep(0.02)
+        self.assertIsNone(program.poll())
+        program.send_signal(signal.SIGKILL)
+        program.wait()
+        self.assertFalse(pathlib.Path(f"{out}.errors").exists())
+        kept = {file.name: file.stat().st_mtime_ns for file in pathlib.Path(f"{out}.work").glob("*.scan")}
+        subprocess.run(command, check=True, capture_output=True)
+        for file in pathlib.Path(f"{out}.work").glob("*.scan"):
+            self.assertEqual(kept.get(file.name, file.stat().st_mtime_ns), file.stat().st_mtime_ns)
+        self.assertEqual(pathlib.Path(f"{out}.errors").read_bytes(), self.table.read_bytes())
+
+    def test_pictures_have_none(self):
+        picture = write_raster(self.folder / "picture.tif", np.zeros((3, 64, 64), np.uint8))
+        done = self.tellurion("ingest", picture, "--out", self.folder / "no-table.tif", "--error-table", "yes", status=FAILED)
+        self.assertIn("picture", done.stderr.strip().splitlines()[-1])
 
 
 class BadInput(IngestCase):
