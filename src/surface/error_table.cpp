@@ -1,6 +1,7 @@
 #include "surface/error_table.h"
 
 #include <cassert>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -49,6 +50,13 @@ bool is_sound(const std::vector<RecordTree::Node>& nodes) {
     next += 4;
   }
   return next == nodes.size();
+}
+
+/// Whether the numbers can be those of a scan: a table beside a raster comes from anywhere.
+bool is_sound(const TileRecord& record) {
+  const HeightError& error = record.error;
+  return std::isfinite(record.min_height) && std::isfinite(record.max_height) && record.min_height <= record.max_height && error.common >= 0.0f && error.common <= error.bound &&
+         std::isfinite(error.bound) && record.whole <= 1;
 }
 
 }  // namespace
@@ -124,6 +132,7 @@ Result<ErrorTable> ErrorTable::load(const std::filesystem::path& path, std::stri
   RecordTree tree(count);
   for (RecordTree::Node& node : tree.nodes()) {
     if (!take(rest, node)) return corrupt("cut off");
+    if (!is_sound(node.record)) return corrupt("impossible heights");
   }
   const std::size_t summed = content.size() - rest.size();
   if (!take(rest, checksum) || !rest.empty()) return corrupt("wrong length");

@@ -1,6 +1,7 @@
 #include "surface/error_table.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -247,6 +248,25 @@ TEST_CASE("save, load: the same table comes back; anything wrong with the file i
     REQUIRE(!result);
     REQUIRE(result.error().code == ErrorCode::corrupt);
   }
+}
+
+TEST_CASE("load: heights and errors that no scan finds are corrupt") {
+  const Removed file{scratch("")};
+  const auto loads = [&](const TileRecord& record) {
+    RecordTree tree(geo::kFaceCount);
+    tree[3].record = record;
+    REQUIRE(ErrorTable(std::move(tree)).save(file.path, "r"));
+    return ErrorTable::load(file.path, "r").has_value();
+  };
+  CHECK(loads({-5, 7, {3, 2}, 1}));
+  CHECK_FALSE(loads({NAN, 7, {3, 2}, 0}));
+  CHECK_FALSE(loads({-5, INFINITY, {3, 2}, 0}));
+  CHECK_FALSE(loads({8, 7, {3, 2}, 0}));
+  CHECK_FALSE(loads({-5, 7, {2, 3}, 0}));
+  CHECK_FALSE(loads({-5, 7, {INFINITY, 2}, 0}));
+  CHECK_FALSE(loads({-5, 7, {NAN, NAN}, 0}));
+  CHECK_FALSE(loads({-5, 7, {3, -1}, 0}));
+  CHECK_FALSE(loads({-5, 7, {3, 2}, 2}));
 }
 
 TEST_CASE("scan_subtree: gives up when asked to") {
