@@ -178,15 +178,15 @@ class Scanner {
 
   Result<void> scan_leaf() {
     OnPath& leaf = path_.back();
+    const Result<bool> whole = is_covered_by_one(model_, leaf.key);
+    if (!whole) return whole.error();
+    leaf.record.whole = *whole ? 1 : 0;
     const auto [lowest, highest] = std::minmax_element(leaf.heights.begin(), leaf.heights.end());
     extend_range(*lowest, *highest);
     const double finest = finest_spacing(model_.description().heights, leaf.key);
     const bool finer_than_data = nominal_grid_spacing(model_.description().ellipsoid, leaf.key.level) <= 0.75 * finest;
     const Result<void> scanned = finer_than_data ? compare_fine_grid() : compare_samples();
     if (!scanned) return scanned;
-    const Result<bool> whole = is_covered_by_one(model_, leaf.key);
-    if (!whole) return whole.error();
-    leaf.record.whole = *whole ? 1 : 0;
     for (OnPath& tile : path_) {
       const double count = tile.in_leaf.count();
       if (count > 0.0) tile.tally.add(tile.in_leaf, std::ldexp(1.0, -2 * leaf.key.level) / count);
@@ -223,7 +223,7 @@ class Scanner {
     const double finest = finest_spacing(model_.description().heights, key);
     bool some_raster_ends = false;
     const Result<void> all = model_.for_each_under(key, [&](cache::CachedRaster& raster, Metres spacing) {
-      some_raster_ends = some_raster_ends || !raster.description().wraps;
+      some_raster_ends = some_raster_ends || (!raster.description().wraps && path_.back().record.whole == 0);
       return scan_raster(raster, spacing.value <= finest);
     });
     if (!all) return all;

@@ -59,31 +59,12 @@ struct Removed {
   ~Removed() { std::filesystem::remove_all(path); }
 };
 
-}  // namespace
-
-TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, and is not far too large") {
-  const auto seed = fresh_seed();
-  CAPTURE(seed);
-  MadeWorld world({layer_of(rough_globe(seed), 1), layer_of(rough_region(seed), 2)});
+/// Holds the table of a world against its surface at random places of tiles; the level of the deepest that it knows.
+int check_table(MadeWorld& world, const std::vector<geo::TileKey>& keys, std::mt19937_64& random) {
   const auto table = std::make_shared<ErrorTable>(merge_scans(scans_of(world)));
   const auto facts = make_facts(world.description, std::make_shared<KnownErrors>(KnownErrors{table}));
-  std::mt19937_64 random(seed);
   std::vector<double> ratios;
   int deepest = 0;
-  std::vector<geo::TileKey> keys;
-  for (int level = 0; level <= 3; ++level) {
-    for (int i = 0; i < 12; ++i) {
-      geo::TileKey key{static_cast<std::uint8_t>(random() % 6), static_cast<std::uint8_t>(level), 0, 0};
-      key.x = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
-      key.y = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
-      keys.push_back(key);
-    }
-  }
-  std::uniform_real_distribution<double> latitude(44.9, 47.1), longitude(6.9, 9.1);
-  for (int i = 0; i < 30; ++i) {
-    const geo::TileKey deep = geo::tile_at(geo::normal_at(at(latitude(random), longitude(random))), 12);
-    for (int level = 4; level <= 8; ++level) keys.push_back(geo::ancestor(deep, level));
-  }
   for (const geo::TileKey& key : keys) {
     const TileFacts known = facts->facts_of(key);
     if (!known.height_error) continue;
@@ -118,9 +99,56 @@ TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, 
       CHECK(above.max_height >= known.max_height);
     }
   }
-  CHECK(deepest >= 6);
   std::nth_element(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2), ratios.end());
   CHECK(ratios[ratios.size() / 2] < 2);
+  return deepest;
+}
+
+}  // namespace
+
+TEST_CASE("scan_subtree: the table bounds the truth of every tile, is monotone, and is not far too large") {
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  MadeWorld world({layer_of(rough_globe(seed), 1), layer_of(rough_region(seed), 2)});
+  std::mt19937_64 random(seed);
+  std::vector<geo::TileKey> keys;
+  for (int level = 0; level <= 3; ++level) {
+    for (int i = 0; i < 12; ++i) {
+      geo::TileKey key{static_cast<std::uint8_t>(random() % 6), static_cast<std::uint8_t>(level), 0, 0};
+      key.x = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
+      key.y = static_cast<std::uint32_t>(random()) & ((1u << level) - 1);
+      keys.push_back(key);
+    }
+  }
+  std::uniform_real_distribution<double> latitude(44.9, 47.1), longitude(6.9, 9.1);
+  for (int i = 0; i < 30; ++i) {
+    const geo::TileKey deep = geo::tile_at(geo::normal_at(at(latitude(random), longitude(random))), 12);
+    for (int level = 4; level <= 8; ++level) keys.push_back(geo::ancestor(deep, level));
+  }
+  CHECK(check_table(world, keys, random) >= 6);
+}
+
+TEST_CASE("scan_subtree: the same of a raster alone, whose tiles are covered wholly but at its borders") {
+  const auto seed = fresh_seed();
+  CAPTURE(seed);
+  MadeRaster region = rough_region(seed);
+  region.width = region.height = 400;
+  region.west = 6, region.east = 10, region.south = 44, region.north = 48;
+  region.metres = [seed](int x, int y) { return noise(x, y, seed, 0, 200) + noise(x / 9, y / 9, seed + 1, 0, 2500); };
+  MadeWorld world({layer_of(region, 1)});
+  const ErrorTable table = merge_scans(scans_of(world));
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> latitude(43.9, 48.1), longitude(5.9, 10.1);
+  std::vector<geo::TileKey> keys;
+  int whole = 0, partly = 0;
+  for (int i = 0; i < 30; ++i) {
+    const geo::TileKey deep = geo::tile_at(geo::normal_at(at(latitude(random), longitude(random))), 12);
+    for (int level = 3; level <= 8; ++level) keys.push_back(geo::ancestor(deep, level));
+    ++(table.find(deep).record.whole != 0 ? whole : partly);
+  }
+  CHECK(whole > 3);
+  CHECK(partly > 3);
+  CHECK(check_table(world, keys, random) >= 6);
 }
 
 TEST_CASE("merge_scans: the table is the same whichever worker does what, in whatever order") {
