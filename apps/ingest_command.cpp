@@ -45,10 +45,10 @@ void print_report(const prepare::IngestReport& report, const std::filesystem::pa
 
 /// Shows progress; ends the work when the user asks for it.
 prepare::IngestWatch watch_from(Clock::time_point start) {
-  stop_on_interrupt();
   return [start, line = std::shared_ptr<ProgressLine>(), measures = false](const prepare::IngestProgress& progress) mutable {
     constexpr double kPixelsOfUnit = 1e6;
     if (!line || measures != progress.measures) {
+      stop_on_interrupt();
       measures = progress.measures;
       line = std::make_shared<ProgressLine>(static_cast<double>(progress.all_pixels) / kPixelsOfUnit, measures ? "megapixels measured" : "megapixels", measures ? Clock::now() : start);
     }
@@ -58,6 +58,7 @@ prepare::IngestWatch watch_from(Clock::time_point start) {
 }
 
 int run_ingest(const prepare::IngestOptions& options, bool remove_work) {
+  stop_on_interrupt();
   const auto start = Clock::now();
   const auto report = prepare::ingest(options, watch_from(start));
   if (!report) return apps::report(report.error());

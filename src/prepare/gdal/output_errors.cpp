@@ -131,16 +131,17 @@ class Measurement {
 Result<bool> make_error_table(const fs::path& out, const fs::path& folder, const ErrorTableOptions& options, const IngestWatch& watch) {
   const fs::path file = surface::prepared_table_file(out);
   std::error_code error;
-  const Result<source::RasterBody> body = source::body_of_raster(out);
-  if (!body) return body.error();
   const bool is_asked_for = options.wanted.value_or(false);
+  const auto unreadable = [&](const Error& why) { return is_asked_for ? Result<bool>(why) : Result<bool>(false); };  // other programs may well read it
+  const Result<source::RasterBody> body = source::body_of_raster(out);
+  if (!body) return unreadable(body.error());
   if (is_asked_for && body->kind == source::SampleKind::colour) return {ErrorCode::invalid_argument, fmt::format("{} is a picture: there are error tables of heights only; leave --error-table out", out.string())};
   const geo::Ellipsoid ellipsoid = world_of(body->ellipsoid);
   source::GdalOptions how;
   how.path = fs::absolute(out, error).lexically_normal().string();
   how.kind = is_asked_for ? source::SampleKind::height : body->kind;
   Result<std::unique_ptr<source::RasterSource>> opened = source::open_gdal(how, ellipsoid);
-  if (!opened) return opened.error();
+  if (!opened) return unreadable(opened.error());
   const std::shared_ptr<const source::RasterSource> output = std::move(*opened);
   const source::LevelSize& size = output->description().levels.front();
   const bool is_large = static_cast<double>(size.width) * size.height > surface::kMostScannedSamples;
