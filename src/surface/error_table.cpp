@@ -13,6 +13,8 @@
 namespace tellurion::surface {
 namespace {
 
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 30;  ///< of a file: enough for some 5 * 10^11 samples
+
 /// Also tells another byte order and another version of the format apart.
 constexpr std::uint64_t kMagic = 0x32'65'6c'62'61'74'6c'74;
 
@@ -117,9 +119,15 @@ Result<void> ErrorTable::save(const std::filesystem::path& path, std::string_vie
 Result<ErrorTable> ErrorTable::load(const std::filesystem::path& path, std::string_view revision) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return Error{ErrorCode::not_found, "no error table " + path.string()};
+  std::error_code failure;
+  if (std::filesystem::file_size(path, failure) > kMostBytes) return Error{ErrorCode::corrupt, "error table " + path.string() + ": too large"};
   const std::vector<char> content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  return from_bytes(content, revision, path.string());
+}
+
+Result<ErrorTable> ErrorTable::from_bytes(std::span<const char> content, std::string_view revision, const std::string& name) {
   const auto corrupt = [&](const char* why) {
-    return Error{ErrorCode::corrupt, "error table " + path.string() + ": " + why + "; it will be made again"};
+    return Error{ErrorCode::corrupt, "error table " + name + ": " + why + "; it will be made again"};
   };
 
   std::span<const char> rest(content);

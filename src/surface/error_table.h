@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +65,8 @@ class ErrorTable {
   Result<void> save(const std::filesystem::path& path, std::string_view revision) const;
   /// Errors: not_found; corrupt (wrong checksum, cut off, or of another `revision`). In either case: scan again.
   static Result<ErrorTable> load(const std::filesystem::path& path, std::string_view revision);
+  /// The content of such a file, whatever it is; `name` is what errors call it.
+  static Result<ErrorTable> from_bytes(std::span<const char> content, std::string_view revision, const std::string& name);
 
  private:
   RecordTree tree_;

@@ -342,6 +342,13 @@ class ErrorTable(IngestCase):
             self.assertEqual(kept.get(file.name, file.stat().st_mtime_ns), file.stat().st_mtime_ns)
         self.assertEqual(pathlib.Path(f"{out}.errors").read_bytes(), self.table.read_bytes())
 
+    def test_memory_stays_within_its_bound_while_it_is_made(self):
+        script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True); print('kB', resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+        done = subprocess.run(["/usr/bin/python3", "-c", script, PROGRAM, "ingest", str(self.source), "--out", str(self.folder / "small-memory.tif"), "--vertical", "ellipsoid",
+                               "--error-table", "yes", "--memory", "192", "--workers", "2"], check=True, capture_output=True, text=True)
+        self.assertLess(int(done.stdout.split("kB")[1]), 192 * 1024)
+        self.assertEqual((self.folder / "small-memory.tif.errors").read_bytes(), self.table.read_bytes())
+
     def test_pictures_have_none(self):
         picture = write_raster(self.folder / "picture.tif", np.zeros((3, 64, 64), np.uint8))
         done = self.tellurion("ingest", picture, "--out", self.folder / "no-table.tif", "--error-table", "yes", status=FAILED)
