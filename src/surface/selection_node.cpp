@@ -11,6 +11,14 @@ constexpr std::size_t kQuadsPrunedPerFrame = 32;
 
 }  // namespace
 
+const Outlook::Block* foretold(const Node& node) {
+  for (const Node* above = node.parent; above != nullptr; above = above->parent) {
+    if (above->key.level % kOutlookLevels == 0 && above->built && above->built->metrics.outlook)
+      return &above->built->metrics.outlook->of(above->key, node.key);
+  }
+  return nullptr;
+}
+
 void UseOrder::remove(Node& node) {
   NodePart& part = node.part(part_);
   if (part.older == nullptr && oldest_ != &node) return;  // not listed
@@ -107,7 +115,7 @@ void NodePool::add_children(Node& node) {
 
 void NodePool::prune(FrameNumber frame, TimePoint now) {
   const auto is_idle = [&](const Node& node) {
-    return node.children == nullptr && node.seen + kFramesKept < frame &&
+    return node.children == nullptr && std::max(node.seen, node.sighted) + kFramesKept < frame &&
            std::ranges::all_of(node.parts, [&](const NodePart& part) {
              return part.wanted + kFramesKept < frame && can_request(part.life, now);
            });

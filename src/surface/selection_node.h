@@ -54,6 +54,11 @@ struct Node {
   double box_lowest = 0;
   double box_highest = -1;      ///< below box_lowest: no box yet
 
+  FrameNumber sighted = 0;      ///< last frame that looked how low its ground is
+  OrientedBox column;           ///< from its lowest point up, at least to height 0; kept as `box` is
+  double column_lowest = 0;
+  double column_highest = -1;   ///< below column_lowest: none yet
+
   // What the frame `seen` found.
   FrameNumber seen = 0;
   bool visible = false;
@@ -71,6 +76,8 @@ struct Node {
   Node* colour_shown = nullptr;
   Node* slope_owner = nullptr;
   Node* slope_shown = nullptr;
+  FrameNumber awaited = 0;      ///< last frame in which colours finer than its own were wanted and not shown,
+  TimePoint awaited_since;      ///< and the first of all up to it
 
   // What the frame `drawn` made of it.
   FrameNumber drawn = 0;
@@ -95,6 +102,9 @@ struct Node {
   const Resident* resident(Part p) const { return std::get_if<Resident>(&part(p).life); }
   bool is_root() const { return parent == nullptr; }
 };
+
+/// What the nearest ancestor with an outlook foretells of the node; null if none has one.
+const Outlook::Block* foretold(const Node& node);
 
 /// The resident parts of one kind, from the one to drop first: least recently used, descendants before their ancestors.
 /// Roots are never listed.

@@ -1,18 +1,23 @@
 #include "surface/selection_requests.h"
 
 #include <algorithm>
+#include <chrono>
 #include <tuple>
 
 namespace tellurion::surface {
 namespace {
 
 /// Texels of a tile that finer ones will cover are worth their bytes if they are not much coarser than the picture on the way to
-/// them, nor nearly as fine: one step of kOutlookLevels for most tiles.
+/// them, nor nearly as fine: one step of kOutlookLevels for most tiles. And only where what will cover them lets itself wait.
 constexpr double kFinestStepPixels = 8, kCoarsestStepPixels = 64;
+constexpr std::chrono::seconds kPatience{2};
 
-bool is_worth_a_step(const SelectionFrame& frame, const Node& node) {
+/// Called in each frame in which finer tiles are to cover the node's colours and do not yet.
+bool is_worth_a_step(const SelectionFrame& frame, Node& node) {
+  if (node.awaited != frame.last) node.awaited_since = frame.now;
+  node.awaited = frame.number;
   const double px = to_pixels(frame.errors, texel_metres(node.shape), node.distance) * node.texel_share / frame.settings.sse_px;
-  return px >= kFinestStepPixels && px < kCoarsestStepPixels;
+  return px >= kFinestStepPixels && px < kCoarsestStepPixels && frame.now - node.awaited_since >= kPatience;
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface/lowest_in_sight.h"
+
 namespace tellurion::surface {
 namespace {
 
@@ -17,15 +19,6 @@ struct HeightRange {
   double lowest = 0;
   double highest = 0;
 };
-
-/// What the nearest ancestor with an outlook foretells; null if none has one.
-const Outlook::Block* foretold(const Node& node) {
-  for (const Node* above = node.parent; above != nullptr; above = above->parent) {
-    if (above->key.level % kOutlookLevels == 0 && above->built && above->built->metrics.outlook)
-      return &above->built->metrics.outlook->of(above->key, node.key);
-  }
-  return nullptr;
-}
 
 /// Where facts only assume, a tile of every third level is built before anything below it is asked for: its outlook tells what.
 /// One that can never be built leaves that to those above it.
@@ -80,9 +73,10 @@ SelectionFrame make_frame(NodePool& pool, const view::Camera& camera, const Sele
   lowest *= settings.exaggeration;
   const ErrorView errors{camera.eye.xyz, camera.pixel_angle(), settings.exaggeration, settings.anisotropy,
                          pool.ellipsoid().a()};
-  return {number, last, now, settings, errors, make_view_volume(camera),
-          Horizon(pool.ellipsoid(), camera.eye.xyz, lowest),
-          geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value, lowest};
+  SelectionFrame frame{number, last, now, settings, errors, make_view_volume(camera), Horizon(pool.ellipsoid(), camera.eye.xyz, lowest),
+                       geo::to_geodetic(pool.ellipsoid(), camera.eye).height.value, lowest};
+  frame.horizon = Horizon(pool.ellipsoid(), camera.eye.xyz, lowest_in_sight(pool, frame));
+  return frame;
 }
 
 void WantedCut::see(const SelectionFrame& frame, Node& node) const {

@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <glm/geometric.hpp>
 
+#include "surface/selection_wanted.h"
 #include "surface/selection_world.h"
 #include "surface/tile_bounds.h"
 
@@ -22,7 +23,7 @@ class ReferenceCut {
  public:
   ReferenceCut(const EvenPlanet& planet, const view::Camera& camera, const SelectionSettings& settings)
       : planet_(planet), camera_(camera), settings_(settings), volume_(make_view_volume(camera)),
-        horizon_(planet.ellipsoid, camera.eye.xyz, -planet.relief * settings.exaggeration) {}
+        horizon_(horizon_of(planet, camera, settings)) {}
 
   /// Drawn tiles with their colour and slope owners.
   std::map<geo::TileKey, std::pair<geo::TileKey, geo::TileKey>> find(double sse_px) {
@@ -33,6 +34,12 @@ class ReferenceCut {
   }
 
  private:
+  /// That of the ground in sight, which has tests of its own.
+  static Horizon horizon_of(const EvenPlanet& planet, const view::Camera& camera, const SelectionSettings& settings) {
+    NodePool pool(planet.ellipsoid, std::make_shared<EvenPlanet>(planet));
+    return make_frame(pool, camera, settings, 1, 0, {}).horizon;
+  }
+
   /// `fine_enough`: an ancestor's texels are within the wanted error, and its slot serves all below it.
   void visit(const geo::TileKey& key, geo::TileKey colour, geo::TileKey slopes, bool fine_enough) {
     const TileFacts facts = planet_.facts_of(key);
@@ -204,7 +211,7 @@ TEST_CASE("select: until the picture is complete, roots lie as a floor under eve
         REQUIRE(tile.sink_level == doctest::Approx(lowest));
         REQUIRE(tile.sink_depth >= settings.exaggeration * 0.9 * planet.relief - lowest);
       }
-      for (int point = 0; point < 20; ++point) {
+      for (int point = 0; point < 40; ++point) {
         const geo::Vector<geo::Ecef> ray = camera.ray({1280 * unit(random), 720 * unit(random)});
         const double distance = geo::intersect_ray(planet.ellipsoid, Metres(lowest), camera.eye, ray);
         if (distance < 0) continue;
@@ -272,6 +279,25 @@ TEST_CASE("select: a tile is drawn by its coarsest triangulation that is good en
     }
   }
   for (const int count : drawn) CHECK(count > 0);
+}
+
+TEST_CASE("select: colours on the way to finer ones are asked for only where these let themselves wait") {
+  EvenPlanet planet;
+  planet.colour_level = 12;
+  const view::Camera camera = camera_at(planet.ellipsoid, 40, 50, 5000, 30, -20);
+  const SelectionSettings settings;
+  const auto wanted = ReferenceCut(planet, camera, settings).find(settings.sse_px);
+  std::set<geo::TileKey> owners;
+  for (const auto& [key, of] : wanted) owners.insert(of.first);
+  Flight flight(planet);
+  const auto asked_on_the_way = [&] {
+    return std::ranges::count_if(flight.frame(camera, settings, 0, 0).requests, [&](const TileRequest& request) { return request.part == Part::colour && !owners.contains(request.key); });
+  };
+  for (int frame = 0; frame < 1900 / kFrameTime.count(); ++frame) REQUIRE(asked_on_the_way() == 0);
+  for (int frame = 0; frame < 200 / kFrameTime.count(); ++frame) flight.frame(camera, settings, 0, 0);
+  CHECK(asked_on_the_way() > 0);
+  REQUIRE(flight.finish(camera, settings) != nullptr);
+  CHECK(asked_on_the_way() == 0);
 }
 
 TEST_CASE("select: the wanted error rises by the least step that keeps to max_tiles") {
