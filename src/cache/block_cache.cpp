@@ -37,6 +37,14 @@ struct Entry {
   Name name;
   Block block;
   std::size_t bytes = 0;
+  Remaking remaking = Remaking::dear;
+  std::uint64_t used = 0;
+};
+
+/// Blocks of a kind, the most recently used first.
+struct Shelf {
+  std::list<Entry> entries;
+  std::size_t bytes = 0;
 };
 
 /// A decoding under way: the first thread decodes, the others wait for `outcome`.
@@ -47,34 +55,35 @@ struct Flight {
 }  // namespace
 
 struct BlockCache::State {
-  explicit State(std::size_t budget) : budget_bytes(budget) {}
+  State(std::size_t budget, std::size_t share) : budget_bytes(budget), cheap_bytes(share) {}
 
   template <class Data, class Decode>
-  Result<Frozen<Data>> find_or_decode(const Name& name, const Decode& decode);
-  void keep(const Name& name, const Block& block, std::size_t block_bytes);
+  Result<Frozen<Data>> find_or_decode(const Name& name, Remaking remaking, const Decode& decode);
+  const Block& use(std::list<Entry>::iterator entry);
+  void keep(Entry entry);
+  void drop_oldest(Shelf& shelf);
+  Shelf& shelf_of(Remaking remaking) { return remaking == Remaking::cheap ? cheap : dear; }
 
   const std::size_t budget_bytes;
+  const std::size_t cheap_bytes;
   mutable std::mutex mutex;
   std::condition_variable landed;
-  std::size_t bytes = 0;
-  std::list<Entry> entries;  ///< the most recently used first
+  Shelf dear, cheap;
+  std::uint64_t uses = 0;
   std::unordered_map<Name, std::list<Entry>::iterator, NameHash> index;
   std::unordered_map<Name, std::shared_ptr<Flight>, NameHash> flights;
   std::unordered_map<std::uint32_t, SourceReads> reads;
 };
 
 template <class Data, class Decode>
-Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const Decode& decode) {
+Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, Remaking remaking, const Decode& decode) {
   const auto typed = [](const Result<Block>& outcome) -> Result<Frozen<Data>> {
     if (!outcome) return outcome.error();
     return std::get<Frozen<Data>>(outcome.value());
   };
 
   std::unique_lock lock(mutex);
-  if (const auto found = index.find(name); found != index.end()) {
-    entries.splice(entries.begin(), entries, found->second);
-    return std::get<Frozen<Data>>(found->second->block);
-  }
+  if (const auto found = index.find(name); found != index.end()) return std::get<Frozen<Data>>(use(found->second));
   if (const auto flying = flights.find(name); flying != flights.end()) {
     const std::shared_ptr<Flight> flight = flying->second;
     landed.wait(lock, [&] { return flight->outcome.has_value(); });
@@ -96,7 +105,7 @@ Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const D
     const std::size_t block_bytes = std::get<Frozen<Data>>(block)->bytes();
     ++done.blocks;
     done.bytes += static_cast<std::int64_t>(block_bytes);
-    keep(name, block, sizeof(Entry) + block_bytes);
+    keep({name, block, sizeof(Entry) + block_bytes, remaking});
   } else if (const Error& error = flight->outcome->error(); error.code != ErrorCode::cancelled && error.code != ErrorCode::pending) {
     ++done.errors;
     if (error.code != ErrorCode::unavailable) ++done.lost;
@@ -107,34 +116,48 @@ Result<Frozen<Data>> BlockCache::State::find_or_decode(const Name& name, const D
   return typed(*flight->outcome);
 }
 
-void BlockCache::State::keep(const Name& name, const Block& block, std::size_t block_bytes) {
-  entries.push_front(Entry{name, block, block_bytes});
-  index.emplace(name, entries.begin());
-  bytes += block_bytes;
-  while (entries.size() > 1 && bytes > budget_bytes) {
-    bytes -= entries.back().bytes;
-    index.erase(entries.back().name);
-    entries.pop_back();
+const Block& BlockCache::State::use(std::list<Entry>::iterator entry) {
+  std::list<Entry>& entries = shelf_of(entry->remaking).entries;
+  entry->used = ++uses;
+  entries.splice(entries.begin(), entries, entry);
+  return entry->block;
+}
+
+void BlockCache::State::keep(Entry entry) {
+  Shelf& shelf = shelf_of(entry.remaking);
+  entry.used = ++uses;
+  shelf.bytes += entry.bytes;
+  shelf.entries.push_front(std::move(entry));
+  index.emplace(shelf.entries.front().name, shelf.entries.begin());
+  while (cheap.entries.size() > 1 && cheap.bytes > cheap_bytes) drop_oldest(cheap);
+  while (index.size() > 1 && dear.bytes + cheap.bytes > budget_bytes) {
+    const bool is_cheap = dear.entries.empty() || (!cheap.entries.empty() && cheap.entries.back().used < dear.entries.back().used);
+    drop_oldest(is_cheap ? cheap : dear);
   }
 }
 
-BlockCache::BlockCache(std::size_t budget_bytes) : state_(std::make_unique<State>(budget_bytes)) {}
+void BlockCache::State::drop_oldest(Shelf& shelf) {
+  shelf.bytes -= shelf.entries.back().bytes;
+  index.erase(shelf.entries.back().name);
+  shelf.entries.pop_back();
+}
+
+BlockCache::BlockCache(std::size_t budget_bytes, std::size_t cheap_bytes) : state_(std::make_unique<State>(budget_bytes, cheap_bytes)) {}
 BlockCache::~BlockCache() = default;
 
 Result<Frozen<raster::HeightGrid>> BlockCache::heights(const BlockKey& key, const DecodeHeights& decode) {
-  return state_->find_or_decode<raster::HeightGrid>(Name{key, false}, decode);
+  return state_->find_or_decode<raster::HeightGrid>(Name{key, false}, Remaking::dear, decode);
 }
 
-Result<Frozen<raster::Image>> BlockCache::image(const BlockKey& key, const DecodeImage& decode) {
-  return state_->find_or_decode<raster::Image>(Name{key, true}, decode);
+Result<Frozen<raster::Image>> BlockCache::image(const BlockKey& key, const DecodeImage& decode, Remaking remaking) {
+  return state_->find_or_decode<raster::Image>(Name{key, true}, remaking, decode);
 }
 
 Frozen<raster::HeightGrid> BlockCache::resident_heights(const BlockKey& key) {
   std::lock_guard lock(state_->mutex);
   const auto found = state_->index.find(Name{key, false});
   if (found == state_->index.end()) return {};
-  state_->entries.splice(state_->entries.begin(), state_->entries, found->second);
-  return std::get<Frozen<raster::HeightGrid>>(found->second->block);
+  return std::get<Frozen<raster::HeightGrid>>(state_->use(found->second));
 }
 
 SourceReads BlockCache::reads_of(std::uint32_t source) const {
@@ -145,7 +168,7 @@ SourceReads BlockCache::reads_of(std::uint32_t source) const {
 
 std::size_t BlockCache::bytes() const {
   std::lock_guard lock(state_->mutex);
-  return state_->bytes;
+  return state_->dear.bytes + state_->cheap.bytes;
 }
 
 std::size_t BlockCache::budget_bytes() const { return state_->budget_bytes; }

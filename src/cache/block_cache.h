@@ -37,10 +37,19 @@ struct SourceReads {
   std::string last_error;
 };
 
-/// Least recently used first; holds at most the budget plus one block.
+/// What it takes to have a block again.
+enum class Remaking {
+  dear,   ///< much is read for it, or it cannot be had at all for a while
+  cheap,  ///< one small file of this machine
+};
+
+/// Least recently used first; holds at most the budget plus one block. Blocks that are cheap to remake keep to a share of it: they are
+/// needed for the tiles that lie on them, which are made together, and hardly again.
 class BlockCache {
  public:
-  explicit BlockCache(std::size_t budget_bytes);
+  /// `cheap_bytes`: that share; no more than all.
+  BlockCache(std::size_t budget_bytes, std::size_t cheap_bytes);
+  explicit BlockCache(std::size_t budget_bytes) : BlockCache(budget_bytes, budget_bytes) {}
   ~BlockCache();
   BlockCache(const BlockCache&) = delete;
   BlockCache& operator=(const BlockCache&) = delete;
@@ -50,7 +59,7 @@ class BlockCache {
 
   /// The block, decoded by `decode` if it is not there. An error is passed on and not kept.
   Result<Frozen<raster::HeightGrid>> heights(const BlockKey& key, const DecodeHeights& decode);
-  Result<Frozen<raster::Image>> image(const BlockKey& key, const DecodeImage& decode);
+  Result<Frozen<raster::Image>> image(const BlockKey& key, const DecodeImage& decode, Remaking remaking = Remaking::dear);
 
   /// The block if it is there; null otherwise, without waiting for a thread that decodes it.
   Frozen<raster::HeightGrid> resident_heights(const BlockKey& key);

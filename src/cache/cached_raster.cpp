@@ -195,7 +195,7 @@ Result<raster::Image> CachedRaster::read_colours(int level, const source::PixelW
               level, {left, top, std::min(kBlockSide, size.width - left), std::min(kBlockSide, size.height - top)});
         };
         const BlockKey key{id_, static_cast<std::uint32_t>(level), column, row, content_};
-        Result<Frozen<raster::Image>> decoded = cache_->image(key, std::cref(decode));
+        Result<Frozen<raster::Image>> decoded = cache_->image(key, std::cref(decode), description().is_remote ? Remaking::cheap : Remaking::dear);  // a server's replies are kept on the disk
         if (decoded) {
           block = std::move(decoded).value();
         } else if (decoded.error().code == ErrorCode::pending) {

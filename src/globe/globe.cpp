@@ -59,12 +59,15 @@ struct OpenLayer {
 
 }  // namespace
 
+/// What servers sent lies in the disk cache: it is decoded again where it is needed again.
+constexpr std::size_t kCheapShare = 16;
+
 struct Globe::State {
   State(World w, const GlobeOptions& o)
       : world(std::move(w)),
         options(o),
         // GDAL's own block cache takes a quarter of the budget.
-        blocks(o.memory_cache_bytes - o.memory_cache_bytes / 4) {
+        blocks(o.memory_cache_bytes - o.memory_cache_bytes / 4, o.cache_folder.empty() ? o.memory_cache_bytes : o.memory_cache_bytes / kCheapShare) {
     kept.file = world.file;
     for (std::size_t i = 0; !kept.file.empty() && i < world.layers.size(); ++i) kept.layers.insert(i);
   }

@@ -68,6 +68,30 @@ TEST_CASE("BlockCache: bytes stay within the budget plus one block, and a block 
   CHECK(none.bytes() <= kBlockBytes + kOverhead);
 }
 
+TEST_CASE("BlockCache: blocks that are cheap to remake keep to their share and push no others out") {
+  constexpr std::size_t kBytes = kBlockBytes + kOverhead;
+  BlockCache cache(10 * kBytes, 3 * kBytes);
+  int dear = 0, cheap = 0;
+  const auto ask_dear = [&](std::int32_t i) { CHECK(cache.heights(column(i), [&] { return ++dear, block_of(1); })); };
+  const auto ask_cheap = [&](std::int32_t i) {
+    CHECK(cache.image(column(i), [&]() -> Result<raster::Image> { return ++cheap, raster::Image{64, 64, std::vector<std::uint8_t>(64 * 64 * 4)}; }, Remaking::cheap));
+  };
+  for (int i = 0; i < 6; ++i) ask_dear(i);
+  for (int i = 0; i < 50; ++i) ask_cheap(i);
+  CHECK(cache.bytes() <= 9 * kBytes);
+  for (int i = 0; i < 6; ++i) ask_dear(i);
+  CHECK(dear == 6);
+  for (int i = 47; i < 50; ++i) ask_cheap(i);
+  CHECK(cheap == 50);
+  ask_cheap(46);
+  CHECK(cheap == 51);
+  // The oldest of all goes where all of it is full.
+  for (int i = 6; i < 30; ++i) ask_dear(i);
+  CHECK(cache.bytes() <= 11 * kBytes);
+  ask_cheap(46);
+  CHECK(cheap == 52);
+}
+
 TEST_CASE("BlockCache: a block that was pushed out stays valid for those who hold it") {
   BlockCache cache(0);
   const Frozen<raster::HeightGrid> held = *cache.heights(column(0), [] { return block_of(3); });
