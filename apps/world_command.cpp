@@ -162,7 +162,7 @@ void add_world_files(CLI::App& app, Run& run) {
   group->check([](const std::string& word) { return globe::group_by_name(word) ? std::string() : fmt::format("no group is called \"{}\": see docs/world-file.md", word); });
   CLI::Option* name = adding->add_option("--name", options->name, "of the layer (default: the file's)");
   CLI::Option* opacity = adding->add_option("--opacity", options->opacity, "of the layer, 0 to 1")->check(CLI::Range(0.0, 1.0));
-  CLI::Option* feather = adding->add_option("--feather", options->feather, "pixels over which pictures fade in from their edges (0)")->check(CLI::Range(0.0, globe::kMostFeather))->type_name("PIXELS");
+  CLI::Option* feather = adding->add_option("--feather", options->feather, "pixels of the data over which it fades in from its edges (0)")->check(CLI::Range(0.0, globe::kMostFeather))->type_name("PIXELS");
   CLI::Option* vertical = adding->add_option("--vertical", options->vertical, "what heights are above: ellipsoid, sphere, egm96 or a vertical CRS (default: what the data say)")->type_name("DATUM");
   CLI::Option* no_data = adding->add_option("--no-data", options->no_data, "the value of rasters that means nothing is there (default: their own)")->type_name("VALUE");
   CLI::Option* is_list = adding->add_flag("--list", options->is_list, "the data are lists of rasters (a VRT, an index of gdaltindex, STAC items): a catalogue of each");

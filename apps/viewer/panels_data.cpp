@@ -46,13 +46,14 @@ void catalogue_rows(const globe::CatalogueFacts& facts) {
 
 /// Sliders for what may be changed of a layer. Whether something was.
 bool settings_rows(globe::LayerSettings& settings, globe::LayerGroup group) {
-  if (group == globe::LayerGroup::height) return ImGui::Checkbox("added to the heights below", &settings.adds);
   const auto slider = [](const char* name, double& value, double least, double most, ImGuiSliderFlags flags = 0) {
     return ImGui::SliderScalar(name, ImGuiDataType_Double, &value, &least, &most, "%.2f", flags | ImGuiSliderFlags_AlwaysClamp);
   };
-  bool changed = slider("opacity", settings.opacity, 0.0, 1.0);
+  const bool is_height = group == globe::LayerGroup::height;
+  bool changed = is_height ? ImGui::Checkbox("added to the heights below", &settings.adds) : slider("opacity", settings.opacity, 0.0, 1.0);
   changed |= slider("feather", settings.feather, 0.0, std::max(200.0, settings.feather), ImGuiSliderFlags_Logarithmic);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("fades in from its edges over so many pixels of the data");
+  if (is_height) return changed;
   if (group == globe::LayerGroup::normal) return changed;
   changed |= slider("gamma", settings.gamma, 0.1, 10.0, ImGuiSliderFlags_Logarithmic);
   changed |= slider("multiplier", settings.multiplier, 0.0, 4.0);

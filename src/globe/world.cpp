@@ -93,7 +93,6 @@ class WorldReader {
       if (const toml::node* node = table.get(key); node && layer.group == LayerGroup::normal) fail(*node, fmt::format("normals have no `{}`: they are directions", key));
     }
     layer.feather = number(table, "feather", 0.0, kMostFeather).value_or(0.0);
-    if (layer.feather > 0.0 && layer.group == LayerGroup::height) fail(*table.get("feather"), "only pictures have a `feather`: heights pass into those below over one sample");
     layer.enabled = flag(table, "enabled").value_or(true);
     layer.attribution = text(table, "attribution").value_or("");
     if (const auto mode = text(table, "mode")) {
@@ -435,7 +434,6 @@ Result<void> check(const LayerSettings& settings, LayerGroup group) {
   if (group == LayerGroup::normal && (settings.gamma != 1.0 || settings.multiplier != 1.0))
     return {ErrorCode::invalid_argument, "normals have no `gamma` and no `multiplier`: they are directions"};
   if (auto fine = out_of_range("feather", settings.feather, 0.0, kMostFeather); !fine) return fine;
-  if (settings.feather > 0.0 && group == LayerGroup::height) return {ErrorCode::invalid_argument, "only pictures have a `feather`"};
   if (settings.adds && group != LayerGroup::height) return {ErrorCode::invalid_argument, "only heights are added to those below"};
   return {};
 }

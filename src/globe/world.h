@@ -94,7 +94,7 @@ struct LayerSettings {
   double opacity = 1.0;     ///< 0 to 1
   double gamma = 1.0;       ///< kLeastGamma to kMostGamma
   double multiplier = 1.0;  ///< within +-kMostMultiplier
-  double feather = 0.0;     ///< pixels of a raster over which it fades inwards from where its data end, to kMostFeather; not of heights
+  double feather = 0.0;     ///< pixels of a raster over which it fades inwards from where its data end, to kMostFeather; heights do from its border only
   bool enabled = true;
   bool adds = false;        ///< height layers: added to the ones below instead of replacing them
 

@@ -65,6 +65,9 @@ void lay_under(cache::HeightSample& upper, const cache::HeightSample& lower, dou
 
 bool is_finite(const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); }
 
+/// How much of a raster's coverage its layer's feather leaves at a pixel.
+double opacity_of(const Layer& layer, const Extent& extent, const glm::dvec2& pixel) { return layer.feather > 0.0 ? opacity_at(extent, pixel, layer.feather) : 1.0; }
+
 /// Pixels of a level per pixel of level 0; each level after the raster's last halves them (see CoarseHeights).
 glm::dvec2 scale_of_level(const source::RasterDescription& raster, int level) {
   const int last = static_cast<int>(raster.levels.size()) - 1;
@@ -107,7 +110,9 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
     }
     Result<cache::CachedRaster> raster = cache::CachedRaster::open(*layer.source, cache, layer.source_id, layer.content);
     if (!raster) return raster.error();
-    model.layers_.emplace(&layer, HeightLayer{layer.source, std::move(raster).value(), reach_of(layer.source->description()), {}, {}});
+    const source::RasterDescription& about = layer.source->description();
+    const Extent extent = extent_of(about, raster->reader());
+    model.layers_.emplace(&layer, HeightLayer{layer.source, std::move(*raster), reach_of(about), extent, {}, {}});
   }
   model.description_ = std::move(description);
   return model;
@@ -183,9 +188,10 @@ ElevationModel::HeightLayer* ElevationModel::open_data_set(const source::Catalog
   if (!source) return nullptr;
   Result<cache::CachedRaster> raster = cache::CachedRaster::open(**source, *cache_, id);
   if (!raster) return nullptr;
-  const geo::GeodeticBounds reach = reach_of((*source)->description());
+  const source::RasterDescription& about = (*source)->description();
+  const Extent extent = extent_of(about, raster->reader());
   if (!reads_) raster->read_nothing();
-  data_sets_.emplace_front(id, HeightLayer{std::move(*source), std::move(raster).value(), reach, {}, {}});
+  data_sets_.emplace_front(id, HeightLayer{std::move(*source), std::move(*raster), reach_of(about), extent, {}, {}});
   data_set_index_[id] = data_sets_.begin();
   return &data_sets_.front().second;
 }
@@ -435,8 +441,10 @@ Result<void> ElevationModel::ask_layer(Batch& batch, std::span<Contributor> rast
         answer.next.push_back(i);
         continue;
       }
-      const cache::HeightSample& sample = samples.heights[n];
+      cache::HeightSample sample = samples.heights[n];
       const glm::dvec2& pixel = samples.pixels[n++];
+      const double opacity = opacity_of(*contributor.settings, raster->extent, pixel);
+      sample.coverage *= opacity;
       std::int32_t& known = answer.open_of[i];
       if (known < 0 && sample.coverage >= 1.0 && !adds) {
         batch.metres[i] = sample.metres;
@@ -448,7 +456,7 @@ Result<void> ElevationModel::ask_layer(Batch& batch, std::span<Contributor> rast
         answer.open.push_back({.place = i, .finest = std::numeric_limits<double>::infinity()});
       }
       OpenPlace& open = answer.open[static_cast<std::size_t>(known)];
-      if (is_finite(pixel)) open.reach = std::max(open.reach, bring_within(about, level, pixel).reach);
+      if (is_finite(pixel)) open.reach = std::max(open.reach, opacity * bring_within(about, level, pixel).reach);
       if (sample.coverage > 0.0) open.finest = std::min(open.finest, spacing);
       lay_under(open.height, sample);
       if (open.height.coverage < 1.0) {
@@ -605,6 +613,7 @@ Result<ElevationAnswer> ElevationModel::height_at(const geo::LatLon& place, Look
     pixel = (glm::min(glm::floor(pixel * scale), last) + 0.5) / scale;
     cache::HeightSample sample;
     if (Result<void> read = layer.raster.sample_heights(level, {&pixel, 1}, {&sample, 1}); !read) return read.error();
+    sample.coverage *= opacity_of(*contributor.settings, layer.extent, pixel);
     const bool adds = contributor.settings->adds;
     if (sample.coverage > 0.0) {
       from_the_top.push_back({sample, adds, spacing_of_level(raster, level)});

@@ -18,6 +18,7 @@
 #include "source/catalogue/catalogue.h"
 #include "source/raster_source.h"
 #include "surface/coarse_heights.h"
+#include "surface/feather.h"
 #include "surface/tile_content.h"
 #include "surface/tile_grid.h"
 
@@ -35,7 +36,7 @@ struct Layer {
   float opacity = 1.0f;
   float gamma = 1.0f;
   float multiplier = 1.0f;
-  double feather = 0.0;          ///< image layers: pixels of a raster over which it fades inwards from where its data end
+  double feather = 0.0;          ///< pixels of a raster over which it fades inwards from its border, and images from their voids
   bool adds = false;             ///< height layers: added to the ones below instead of replacing them
   ImageUse use = ImageUse::colour;  ///< image layers: what they are drawn into
 
@@ -70,8 +71,8 @@ struct ElevationAnswer {
   double spacing = 0;       ///< metres between the samples of the finest layer that contributed; infinite if none did
 };
 
-/// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample), so the surface is
-/// continuous across voids and borders; 0 where there is nothing. The rasters of a catalogue are one layer: the finer (or the one named
+/// Height at places: every layer replaces the ones below by its coverage (see cache::HeightSample; from its border inwards by that of
+/// its feather, see opacity_at), so the surface is continuous across voids and borders; 0 where there is nothing. The rasters of a catalogue are one layer: the finer (or the one named
 /// later) replaces the others. A void inside a layer shows the finest data that there are: the layer's own coarser levels, made of the
 /// samples round the void, as long as they are finer than the layers below (not beyond level kCoarsestFill); then those layers. So
 /// a hole in a mountain's samples is no pit down to a coarse globe.
@@ -120,6 +121,7 @@ class ElevationModel {
     std::shared_ptr<const source::RasterSource> source;
     cache::CachedRaster raster;
     geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
+    Extent extent;
     std::vector<CoarseHeights> beyond; ///< levels after the raster's last, made when a void asks for them
     RasterSamples samples;
   };

@@ -411,7 +411,7 @@ bool is_scanned(const Layer& layer) {
 }
 
 bool wants_prepared_table(const SurfaceDescription& description, const Layer& layer) {
-  if (!layer.enabled || layer.catalogue || layer.source->description().is_remote) return false;
+  if (!layer.enabled || layer.catalogue || layer.feather > 0.0 || layer.source->description().is_remote) return false;
   return !is_scanned(layer) || std::ranges::count_if(description.heights, &Layer::enabled) == 1;
 }
 
@@ -429,6 +429,7 @@ std::string table_revision(const SurfaceDescription& description) {
     if (!is_scanned(layer)) continue;
     revision += layer.adds ? "\n+" : "\n=";
     revision += layer.source->revision();
+    if (layer.feather > 0.0) revision += " feather " + std::to_string(layer.feather);
   }
   return revision;
 }

@@ -36,7 +36,7 @@ Result<bool> has_no_void(cache::CachedRaster& raster, const source::PixelWindow&
 
 Result<bool> is_covered_by_one(ElevationModel& model, const geo::TileKey& key) {
   const std::vector<Layer>& layers = model.description().heights;
-  if (layers.size() != 1 || layers.front().catalogue || layers.front().adds) return false;
+  if (layers.size() != 1 || layers.front().catalogue || layers.front().adds || layers.front().feather > 0.0) return false;
   bool whole = false;
   const Result<void> looked = model.for_each_under(key, [&](cache::CachedRaster& raster, Metres) -> Result<void> {
     const source::PixelWindow window = window_under(raster.reader(), raster.description(), key);

@@ -153,9 +153,51 @@ class Feather(Case):
             self.agree(f"catalogue at {lat} {lon}", picture, expected)
         self.assertGreater(max(pictures), 3000)
 
+    def test_heights(self):
+        """A regional mesa over a low globe, and two of a catalogue: profiles of heights, and of the ground that is drawn."""
+        low = self.heights("low", 100.0, (64, 32), (-180, 360 / 64, 0, 90, 0, -180 / 32), 4326)
+        first = self.heights("mesa", 900.0, *self.CASES["utm"][:3])
+        second = self.heights("plateau", 1400.0, (900, 700), (8.4, 0.002, 0, 47.4, 0, -0.002), 4326)
+        for name, sources, rasters in (("one", self.source(first.file), [(first, 900.0)]),
+                                       ("two", f'{{ type = "catalogue", order = "listed", files = {json.dumps([str(first.file), str(second.file)])} }}', [(first, 900.0), (second, 1400.0)])):
+            world = self.folder / f"heights-{name}.toml"
+            world.write_text("".join(f'[[layer]]\ngroup = "height"\n{more}source = {source}\n' for source, more in ((self.source(low.file), ""), (sources, f"feather = {self.FEATHER}\n"))))
+
+            def expected_at(lat, lon):
+                metres = np.full(lat.shape, 100.0)
+                for raster, own in rasters:
+                    metres += (own - metres) * raster.opacity(lat, lon, self.FEATHER)
+                return metres
+
+            lat, lon = np.linspace(46.2, 47.9, 60), np.linspace(7.6, 9.4, 60)
+            points = "".join(f"{a:.6f} {b:.6f}\n" for a, b in zip(lat, lon))
+            done = subprocess.run([PROGRAM, "height", str(world)], input=points, capture_output=True, text=True, check=True)
+            found = np.array([float(line.split()[2]) for line in done.stdout.strip().splitlines()[-60:]])
+            expected = expected_at(lat, lon)
+            print(f"{name}: heights from {expected.min():.0f} to {expected.max():.0f} m, at most {np.abs(found - expected).max():.4f} m off")
+            self.assertLess(np.abs(found - expected).max(), 0.01)
+            self.assertGreater(((expected > 150) & (expected < 850)).sum(), 10)
+            geo = self.folder / "heights.tif"
+            self.render(world, (46.9, 8.2, 60000, 40, -35), "--size", "{}x{}".format(*SIZE), "--geo", geo, name=f"heights-{name}")
+            lats, lons, metres, distance = read_geo(geo)
+            seen = np.isfinite(metres)
+            off = np.abs(metres - expected_at(np.where(seen, lats, 0.0), np.where(seen, lons, 0.0)))[seen] / (distance[seen] * 2 * TAN / SIZE[1])
+            print(f"{name}: drawn ground {np.percentile(off, 99):.2f} pixels off for 99 %, at most {off.max():.2f}")
+            self.assertLess(np.percentile(off, 99), 1.0)
+
+    def heights(self, name, metres, size, transform, system):
+        raster = self.raster(name, size, transform, system)
+        data = gdal.GetDriverByName("GTiff").Create(str(raster.file), *size, 1, gdal.GDT_Float32, ["TILED=YES"])
+        data.SetGeoTransform(transform)
+        crs = osr.SpatialReference()
+        crs.ImportFromEPSG(system)
+        data.SetProjection(crs.ExportToWkt())
+        data.GetRasterBand(1).Fill(metres)
+        return raster
+
     def test_mistakes_are_told(self):
         raster = self.raster("mistaken", *self.CASES["utm"][:3])
-        for group, value, what in (("color", "-3", "`feather` must be a number from 0"), ("color", '"wide"', "`feather` must be a number"), ("height", "10", "only pictures have a `feather`")):
+        for group, value, what in (("color", "-3", "`feather` must be a number from 0"), ("color", '"wide"', "`feather` must be a number")):
             file = self.folder / "mistake.toml"
             file.write_text(f'[[layer]]\ngroup = "{group}"\nfeather = {value}\nsource = {self.source(raster.file)}\n')
             out = self.folder / "none.png"

@@ -92,7 +92,6 @@ TEST_CASE("parse_world: mistakes name the file and the line") {
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nopacity = nan\nsource = { path = \"a\" }\n"), "w.toml:3: `opacity`"));
   CHECK(contains(message_of("[layer]\ngroup = \"color\"\n"), "two brackets"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nfeather = -1\nsource = { path = \"a\" }\n"), "w.toml:3: `feather` must be a number from 0 to 100000"));
-  CHECK(contains(message_of("[[layer]]\ngroup = \"height\"\nfeather = 8\nsource = { path = \"a\" }\n"), "w.toml:3: only pictures have a `feather`"));
   CHECK(contains(message_of("[[layer]]\ngroup = \n"), "w.toml:2: not valid TOML"));
   CHECK(contains(message_of("[[layer]]\ngroup = \"color\"\nsource = { type = \"wfs\", url = \"u\" }\n"), "\"wfs\""));
   const auto tiles = [](const std::string& more) {

@@ -107,6 +107,26 @@ TEST_CASE("height_at: falls to the layer below across one sample beyond a border
   CHECK(height(world, 50.05, 20.05) == doctest::Approx(250));
 }
 
+TEST_CASE("height_at: with a feather a layer rises from the one below over so many samples, voids are filled as ever") {
+  const auto pit = [](int x, int y) { return std::abs(x - 5) < 2 && std::abs(y - 50) < 2 ? NAN : 700.0f; };
+  Layer upper = layer_of(region(pit), 2);
+  upper.feather = 20;  // 2 degrees
+  MadeWorld world({layer_of(globe(100), 1), upper});
+  CHECK(height(world, 45, 20.05) == doctest::Approx(100));
+  CHECK(height(world, 45, 20) == doctest::Approx(100));
+  CHECK(height(world, 45, 19.5) == doctest::Approx(250));
+  CHECK(height(world, 45, 19.5, Lookup::bilinear, 30e3) == doctest::Approx(250));  // at coarser levels too
+  CHECK(height(world, 45, 19.05, Lookup::nearest) == doctest::Approx(385));
+  CHECK(height(world, 49, 19.5) == doctest::Approx(250));
+  CHECK(height(world, 45, 18) == doctest::Approx(700));
+  CHECK(height(world, 45, 15) == doctest::Approx(700));
+  CHECK(height(world, 44.95, 10.55) == doctest::Approx(100 + 600 * 0.55 / 2));  // in the pit
+  upper.adds = true;
+  MadeWorld added({layer_of(globe(100), 1), upper});
+  CHECK(height(added, 45, 19.5) == doctest::Approx(275));
+  CHECK(height(added, 45, 15) == doctest::Approx(800));
+}
+
 TEST_CASE("height_at: a void shows the layer's own surroundings where they are finer than the layer below") {
   const auto pit = [](int x, int y) { return std::abs(x - 50) < 3 && std::abs(y - 50) < 3 ? NAN : 2000.0f + static_cast<float>(x); };
   MadeWorld over_coarse({layer_of(globe(100), 1), layer_of(region(pit), 2)});
