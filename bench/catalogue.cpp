@@ -154,17 +154,19 @@ Result<void> measure_insertion(Scene& scene, Files& files, const Body& body, Rep
   const std::size_t before = scene.globe->catalogue_of(0)->sets().size();
   const Stopwatch watch;
   if (auto inserted = scene.globe->insert(0, {added}); !inserted) return inserted;
-  int frames = 0;
+  int frames = 0, frames_at_rest = 0;
   double known_ms = 0;
   do {
     scene.view->draw(camera, {});
     scene.thread->finish();
     ++frames;
     if (known_ms == 0 && scene.globe->catalogues_ready()) known_ms = watch.ms();
+    frames_at_rest += known_ms != 0 && scene.view->parts_in_work() == 0;
     if (watch.seconds() > 60.0) return {ErrorCode::unavailable, "a raster put into the catalogue did not show within a minute"};
   } while (!scene.view->stats().complete);
   if (scene.globe->catalogue_of(0)->sets().size() != before + 1) return {ErrorCode::internal, "the raster is not in the catalogue"};
   report.set("insertion_ms", watch.ms(), fmt::format("{} frames; known after {:.0f} ms, the rest is reading and composing what it touches", frames, known_ms));
+  report.set("insertion_frames", frames_at_rest, "of those: frames in which no worker read or composed any of it");
   return {};
 }
 
@@ -215,7 +217,8 @@ std::vector<Benchmark> catalogue_benchmarks() {
                            {"look_into_s", "s", {}},
                            {"open_s", "s", 2.0},
                            {"frame_ratio", "ratio", 1.05},
-                           {"insertion_ms", "ms", {}}},
+                           {"insertion_ms", "ms", {}},
+                           {"insertion_frames", "frames", 2.0}},
                           [&body](const Setting& setting, Report& report) { return measure_catalogue(setting, body, report); }});
   }
   return benchmarks;

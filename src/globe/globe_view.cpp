@@ -594,6 +594,7 @@ std::optional<geo::Point<geo::Ecef>> GlobeView::pick(const view::Camera& camera,
 std::optional<EllipsoidalHeight> GlobeView::ground_below(const view::Camera& camera) { return state_->ground.find(state_->globe, camera); }
 
 const FrameStats& GlobeView::stats() const { return state_->stats; }
+int GlobeView::parts_in_work() const { return state_->in_flight; }
 gpu::RenderThread& GlobeView::thread() { return state_->thread; }
 render::Renderer& GlobeView::renderer() { return *state_->renderer; }
 

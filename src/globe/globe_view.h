@@ -70,6 +70,8 @@ class GlobeView {
   std::optional<EllipsoidalHeight> ground_below(const view::Camera& camera);
 
   const FrameStats& stats() const;
+  /// Parts of tiles that workers read and compose at the moment.
+  int parts_in_work() const;
   gpu::RenderThread& thread();
   render::Renderer& renderer();
 
