@@ -48,12 +48,17 @@ struct Finished {
 
 using FinishedQueue = BoundedQueue<Finished>;
 
-/// What a colour part was composed without, ascending.
-std::vector<std::uint32_t> missing_layers(const Finished& item) {
+/// What a part was composed without.
+std::span<const surface::MissingLayer> missing_layers(const Finished& item) {
+  if (const auto* imagery = std::get_if<surface::TileImagery>(&item.content)) return imagery->missing;
+  if (const auto* geometry = std::get_if<surface::TileGeometry>(&item.content)) return geometry->missing;
+  return {};
+}
+
+/// Their numbers, ascending.
+std::vector<std::uint32_t> numbers_of(std::span<const surface::MissingLayer> layers) {
   std::vector<std::uint32_t> ids;
-  if (const auto* imagery = std::get_if<surface::TileImagery>(&item.content)) {
-    for (const surface::MissingLayer& layer : imagery->missing) ids.push_back(layer.source_id);
-  }
+  for (const surface::MissingLayer& layer : layers) ids.push_back(layer.source_id);
   std::ranges::sort(ids);
   return ids;
 }
@@ -73,7 +78,7 @@ struct GlobeView::State {
   std::shared_ptr<const surface::SurfaceDescription> heights;  ///< the surface whose heights are shown
   surface::TileTree tree;                                      ///< of `facts`
   SlotAges slots{Part::colour};
-  SlotAges meshes{Part::geometry};                             ///< but for the roots: see roots_to_renew
+  SlotAges meshes{Part::geometry};                             ///< roots are not made anew by it: see roots_to_renew
   SlotAges::Stale stale;                                       ///< of the last frame
   SlotAges::Stale stale_meshes;
   /// Room for all that can be in flight, so that no worker ever waits on it.
@@ -119,6 +124,7 @@ struct GlobeView::State {
   Clock::time_point note_failure(const Error& error, std::chrono::seconds pause);
   bool has_given_up();
   Result<surface::TileGeometry> build_bare(const geo::TileKey& key);
+  void show_bare(const geo::TileKey& root, surface::TileGeometry bare);
   Result<void> load_roots();
 };
 
@@ -272,10 +278,11 @@ Result<void> GlobeView::State::upload(const Finished& item) {
 void GlobeView::State::take_over(Finished item) {
   --in_flight;
   SlotAges& age = ages(item.part);
+  const bool is_ground_of_root = item.key.level == 0 && item.part == Part::geometry;
   const bool renews = age.holds(item.key);
   const bool current = item.revision == (item.part == Part::colour ? surface : heights)->revision;
   if (renews && !current) return age.not_asked(item.key);  // its own content is no older
-  if (item.key.level == 0 && item.part == Part::geometry && !current) {  // nor is a root's, which is asked for anew
+  if (is_ground_of_root && !current) {  // nor is a root's, which is asked for anew
     --roots_renewing;
     return;
   }
@@ -287,10 +294,10 @@ void GlobeView::State::take_over(Finished item) {
     waiting.push_back(waiting_part(item.key, item.part, std::move(*awaited)));
     return;
   }
-  if (item.key.level == 0 && item.part == Part::geometry && roots_renewing > 0) --roots_renewing;
+  if (is_ground_of_root && roots_renewing > 0) --roots_renewing;
   const Error* built_wrong = std::get_if<Error>(&item.content);
-  const std::vector<std::uint32_t> missing = missing_layers(item);
-  if (!missing.empty() && !slots.may_lack(item.key, missing)) built_wrong = &std::get<surface::TileImagery>(item.content).missing.front().error;
+  const std::span<const surface::MissingLayer> missing = missing_layers(item);
+  if (!missing.empty() && !age.may_lack(item.key, numbers_of(missing))) built_wrong = &missing.front().error;
   const Result<void> result = built_wrong != nullptr ? Result<void>(*built_wrong) : upload(item);
   if (!result) {
     const Error& error = result.error();
@@ -303,21 +310,19 @@ void GlobeView::State::take_over(Finished item) {
       return tree.cancelled(item.key, item.part);
     }
     const auto retry_at = note_failure(error, kPause);
-    if (retry_at != Clock::time_point::max() && item.key.level == 0 && item.part == Part::geometry) roots_to_retry.insert_or_assign(item.key, retry_at);
+    if (retry_at != Clock::time_point::max() && is_ground_of_root) roots_to_retry.insert_or_assign(item.key, retry_at);
     if (renews) age.failed(item.key, retry_at);
     return tree.failed(item.key, item.part, retry_at);
   }
-  if (item.part == Part::geometry) {
+  if (const auto* geometry = std::get_if<surface::TileGeometry>(&item.content)) tree.arrived_geometry(item.key, geometry->metrics, !geometry->slopes.slopes.empty());
+  else tree.arrived_colour(item.key);
+  if (missing.empty()) {
     patience.progressed(Clock::now());
-    const auto& geometry = std::get<surface::TileGeometry>(item.content);
-    tree.arrived_geometry(item.key, geometry.metrics, !geometry.slopes.slopes.empty());
-    if (item.key.level > 0) meshes.composed(item.key, current);
-  } else if (tree.arrived_colour(item.key); missing.empty()) {
-    patience.progressed(Clock::now());
-    slots.composed(item.key, current);
-  } else {
-    slots.composed_without(item.key, missing, note_failure(std::get<surface::TileImagery>(item.content).missing.front().error, kPauseWithout));
+    return age.composed(item.key, current);
   }
+  const auto retry_at = note_failure(missing.front().error, kPauseWithout);
+  age.composed_without(item.key, numbers_of(missing), retry_at);
+  if (retry_at != Clock::time_point::max() && is_ground_of_root) roots_to_retry.insert_or_assign(item.key, retry_at);
 }
 
 void GlobeView::State::take_over(double upload_ms) {
@@ -432,6 +437,15 @@ Result<surface::TileGeometry> GlobeView::State::build_bare(const geo::TileKey& k
   return worker.build_geometry(std::move(nothing), *facts, key, {});
 }
 
+/// A bare ellipsoid stands in for the ground of a root.
+void GlobeView::State::show_bare(const geo::TileKey& root, surface::TileGeometry bare) {
+  take_over(Finished{root, Part::geometry, heights->revision, std::move(bare)});
+  std::vector<std::uint32_t> all;
+  for (const surface::Layer& layer : heights->heights) all.push_back(layer.source_id);
+  std::ranges::sort(all);
+  meshes.composed_without(root, std::move(all), Clock::time_point::max());
+}
+
 Result<void> GlobeView::State::load_roots() {
   const auto deadline = Clock::now() + kRootDeadline;
   // Twelve jobs; without threads they run here.
@@ -464,7 +478,8 @@ Result<void> GlobeView::State::load_roots() {
       if (!bare) return bare.error();
       if (auto* awaited = std::get_if<source::Awaited>(&item->content)) late.push_back(waiting_part(item->key, item->part, std::move(*awaited)));
       else if (std::get<Error>(item->content).code == ErrorCode::unavailable) roots_to_retry.insert_or_assign(item->key, Clock::now() + kPause);
-      item->content = std::move(*bare);
+      show_bare(item->key, std::move(*bare));
+      continue;
     }
     take_over(std::move(*item));
   }
@@ -476,7 +491,7 @@ Result<void> GlobeView::State::load_roots() {
     auto bare = build_bare(root);
     if (!bare) return bare.error();
     ++in_flight;  // as the one that is taken over, which nobody was asked for
-    take_over(Finished{root, Part::geometry, heights->revision, std::move(*bare)});
+    show_bare(root, std::move(*bare));
     ++still_built;
   }
   roots_renewing = static_cast<int>(late.size()) + still_built;

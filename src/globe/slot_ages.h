@@ -23,7 +23,8 @@ class SlotAges {
 
   explicit SlotAges(surface::Part part) : part_(part) {}
 
-  bool holds(const geo::TileKey& key) const { return slots_.contains(key); }
+  /// Whether the slot is made anew as this tells; the geometry of roots never is.
+  bool holds(const geo::TileKey& key) const { return slots_.contains(key) && (part_ == surface::Part::colour || key.level > 0); }
   /// A slot was composed; `current`: of the layers as they are now.
   void composed(const geo::TileKey& key, bool current) { put(key, Slot{.stale = !current}); }
   /// The same without these layers (numbers of their sources, ascending): old from the start, and asked for again at `retry_at`.

@@ -30,8 +30,12 @@ Result<surface::TileGeometry> SurfaceWorker::build_geometry(std::shared_ptr<cons
                                                             const surface::SurfaceFacts& facts, const geo::TileKey& key, std::stop_token stop) {
   const auto model = elevation(std::move(surface));
   if (!model) return model.error();
+  std::vector<surface::MissingLayer> missing;
+  (*model)->go_without(&missing);
   auto geometry = surface::build_geometry(**model, facts, key, {}, stop);
+  (*model)->go_without(nullptr);
   if ((*model)->take_pending(awaited_)) return Error{ErrorCode::pending, "geometry of " + geo::to_string(key)};
+  if (geometry) geometry->missing = std::move(missing);
   return geometry;
 }
 

@@ -112,7 +112,7 @@ Result<ElevationModel> ElevationModel::open(std::shared_ptr<const SurfaceDescrip
     if (!raster) return raster.error();
     const source::RasterDescription& about = layer.source->description();
     const Extent extent = extent_of(about, raster->reader());
-    model.layers_.emplace(&layer, HeightLayer{layer.source, std::move(*raster), reach_of(about), extent, {}, {}});
+    model.layers_.emplace(&layer, HeightLayer{layer.source_id, layer.source, std::move(*raster), reach_of(about), extent, {}, {}});
   }
   model.description_ = std::move(description);
   return model;
@@ -185,15 +185,26 @@ ElevationModel::HeightLayer* ElevationModel::open_data_set(const source::Catalog
     return &found->second->second;
   }
   auto source = catalogue.open(index);
-  if (!source) return nullptr;
+  if (!source) {
+    // What will never be there is no reason to build the tile again.
+    if (source.error().code == ErrorCode::unavailable) can_do_without(id, source.error());
+    return nullptr;
+  }
   Result<cache::CachedRaster> raster = cache::CachedRaster::open(**source, *cache_, id);
   if (!raster) return nullptr;
   const source::RasterDescription& about = (*source)->description();
   const Extent extent = extent_of(about, raster->reader());
   if (!reads_) raster->read_nothing();
-  data_sets_.emplace_front(id, HeightLayer{std::move(*source), std::move(*raster), reach_of(about), extent, {}, {}});
+  data_sets_.emplace_front(id, HeightLayer{id, std::move(*source), std::move(*raster), reach_of(about), extent, {}, {}});
   data_set_index_[id] = data_sets_.begin();
   return &data_sets_.front().second;
+}
+
+/// If so it is noted.
+bool ElevationModel::can_do_without(std::uint32_t id, const Error& error) const {
+  if (missing_ == nullptr || error.code == ErrorCode::cancelled || error.code == ErrorCode::pending) return false;
+  if (std::ranges::find(*missing_, id, &MissingLayer::source_id) == missing_->end()) missing_->push_back({id, error});
+  return true;
 }
 
 ElevationModel::HeightLayer* ElevationModel::open(Contributor& contributor) {
@@ -432,7 +443,10 @@ Result<void> ElevationModel::ask_layer(Batch& batch, std::span<Contributor> rast
     const int level = level_for_spacing(about, batch.wanted_spacing);
     const double spacing = spacing_of_level(about, level);
     samples.heights.resize(samples.inside.size());
-    if (Result<void> read = raster->raster.sample_heights(level, samples.pixels, samples.heights); !read) return read;
+    if (Result<void> read = raster->raster.sample_heights(level, samples.pixels, samples.heights); !read) {
+      if (can_do_without(raster->id, read.error())) continue;
+      return read;
+    }
 
     answer.next.clear();
     std::size_t n = 0;  // of the places inside, which are in the order of the undecided
@@ -550,7 +564,7 @@ Result<void> ElevationModel::fill_from(const Filler& filler, int level, std::spa
     void_pixels_.push_back(within.pixel);
   }
   void_heights_.resize(reached_.size());
-  if (Result<void> read = sample_level(*filler.raster, level, void_pixels_, void_heights_); !read) return read;
+  if (Result<void> read = sample_level(*filler.raster, level, void_pixels_, void_heights_); !read) return can_do_without(filler.raster->id, read.error()) ? Result<void>() : read;
   for (std::size_t n = 0; n < reached_.size(); ++n) {
     void_heights_[n].coverage *= bring_within(about, level, filler.pixels[reached_[n]]).reach;
     OpenPlace& place = *voids_[reached_[n]];

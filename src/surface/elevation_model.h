@@ -99,6 +99,9 @@ class ElevationModel {
   /// Unit normal of the elevation surface (bilinear) at `place`, ECEF.
   Result<geo::Vector<geo::Ecef>> surface_normal_at(const geo::LatLon& place, double wanted_spacing = 0);
 
+  /// From now on, what cannot be read counts as void and is noted in `missing` instead of failing; null: it fails.
+  void go_without(std::vector<MissingLayer>* missing) { missing_ = missing; }
+
   /// Whether an answer since the last call rests on samples that are on their way and stand in as 0; and what brings them.
   bool take_pending(source::Awaited& awaited);
   /// Whether it would say yes: what was read will be thrown away.
@@ -118,6 +121,7 @@ class ElevationModel {
   };
   /// An open raster: a layer's, or one of a catalogue.
   struct HeightLayer {
+    std::uint32_t id = 0;
     std::shared_ptr<const source::RasterSource> source;
     cache::CachedRaster raster;
     geo::GeodeticBounds reach;         ///< outside of it the layer's coverage is 0
@@ -164,6 +168,7 @@ class ElevationModel {
   HeightLayer* open(Contributor& contributor);
   HeightLayer* open_data_set(const source::Catalogue& catalogue, std::uint32_t index);
   void close_unused();
+  bool can_do_without(std::uint32_t id, const Error& error) const;
   Result<void> compose(Batch& batch, std::size_t count, std::span<const std::uint32_t> which);
   Result<void> ask_layer(Batch& batch, std::span<Contributor> rasters, std::span<const std::uint32_t> which, LayerAnswer& answer);
   Result<void> fill_voids(Batch& batch, std::span<Contributor> rasters, std::vector<OpenPlace>& open);
@@ -176,6 +181,7 @@ class ElevationModel {
   cache::BlockCache* cache_ = nullptr;
   bool has_catalogue_ = false;
   bool reads_ = true;
+  std::vector<MissingLayer>* missing_ = nullptr;
   std::unordered_map<const Layer*, HeightLayer> layers_;  ///< those of one source
   std::list<std::pair<std::uint32_t, HeightLayer>> data_sets_;  ///< open ones of catalogues by their number, the last used first
   std::unordered_map<std::uint32_t, std::list<std::pair<std::uint32_t, HeightLayer>>::iterator> data_set_index_;

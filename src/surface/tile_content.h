@@ -104,10 +104,17 @@ struct SlopeMap {
   std::vector<glm::vec2> slopes;       ///< empty: use the parent's
 };
 
+/// A layer, or a raster of a catalogue, that could not be read: the tile is composed of the others.
+struct MissingLayer {
+  std::uint32_t source_id = 0;
+  Error error;
+};
+
 struct TileGeometry {
   TileMesh mesh;
   SlopeMap slopes;
   TileMetrics metrics;
+  std::vector<MissingLayer> missing{};
 };
 
 /// What an image layer tells of the ground: its colour by day; its brightness, which takes the place of the colours' own; the light
@@ -139,12 +146,6 @@ struct ImagePatch {
   float gamma = 1.0f;
   float multiplier = 1.0f;
   ImageUse use = ImageUse::colour;
-};
-
-/// A layer that could not be read: the tile is composed of the others.
-struct MissingLayer {
-  std::uint32_t source_id = 0;
-  Error error;
 };
 
 struct TileImagery {

@@ -22,6 +22,7 @@
 #include "globe/world_edit.h"
 #include "source/drawn_source.h"
 #include "source/made_raster.h"
+#include "surface/made_world.h"
 
 using namespace tellurion;
 using namespace tellurion::globe;
@@ -446,6 +447,44 @@ TEST_CASE("save_layers: layers that were added come into the world's file, and t
   REQUIRE(globe->remove_layer(1).has_value());
   CHECK(saved().empty());
   std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("heights whose server does not answer are left out, and shown once it does") {
+  const Files files;
+  auto thread = gpu::RenderThread::headless(gpu::Api::core);
+  REQUIRE(thread.has_value());
+  World world;
+  world.layers = {layer_of(files.low, LayerGroup::height), layer_of(files.red, LayerGroup::color)};
+  const auto without = Show(**thread, world, 2).finished_picture();
+  const auto server = std::make_shared<std::atomic<bool>>(true);
+  surface::testing::MadeRaster remote;
+  remote.server = server;
+  remote.metres = [](int x, int y) { return surface::testing::noise(x, y, 7, 5000, 60000); };
+  LayerSpec far;
+  far.name = "far";
+  far.group = LayerGroup::height;
+  far.source.raster = std::make_shared<surface::testing::MadeSource>(remote);
+  world.layers.push_back(far);
+  const auto with = Show(**thread, world, 2).finished_picture();
+  const auto difference = [](const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
+    return sum / static_cast<double>(a.size());
+  };
+  REQUIRE(difference(with, without) > 5);
+
+  *server = false;
+  Show show(**thread, world, 2);
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  double lacking = 0;
+  do {
+    for (int frame = 0; frame < 20; ++frame) (void)show.view->update(show.camera, {}, 5.0);
+    lacking = difference(show.view->picture(show.camera, {}).rgba, without);
+  } while (lacking > 0.5 && std::chrono::steady_clock::now() < deadline);
+  CHECK(lacking <= 0.5);
+  CHECK_FALSE(show.view->stats().complete);
+  *server = true;
+  CHECK((show.picture_after_frames() == with));
 }
 
 TEST_CASE("refresh_layer: what a program draws, and a file that has changed, show as they are now") {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -34,6 +35,7 @@ struct MadeRaster {
   std::function<std::array<std::uint8_t, 4>(int, int)> colour = [](int, int) { return std::array<std::uint8_t, 4>{255, 255, 255, 255}; };
   std::string revision = "1";
   bool broken = false;  ///< its colours cannot be read
+  std::shared_ptr<const std::atomic<bool>> server{};  ///< not null: its heights are on one, which is there or not
 };
 
 /// Says yes for every tile; the tests' planets are small in number of tiles.
@@ -42,6 +44,7 @@ class MadeSource final : public source::RasterSource, public source::Coverage {
   explicit MadeSource(MadeRaster made) : made_(std::move(made)) {
     about_.name = "made";
     about_.kind = source::SampleKind::height;
+    about_.is_remote = made_.server != nullptr;
     for (source::LevelSize size{made_.width, made_.height};; size = {(size.width + 1) / 2, (size.height + 1) / 2}) {
       about_.levels.push_back(size);
       if (size.width <= cache::kBlockSide && size.height <= cache::kBlockSide) break;
@@ -84,6 +87,7 @@ class MadeSource final : public source::RasterSource, public source::Coverage {
     explicit Reader(const MadeSource& source) : source_(source), made_(source.made_) {}
 
     Result<raster::HeightGrid> read_heights(int level, const source::PixelWindow& w) override {
+      if (made_.server && !*made_.server) return Error{ErrorCode::unavailable, "made: nobody answers"};
       raster::HeightGrid grid{w.width, w.height, {}};
       for_each(level, w, [&](int x0, int y0, int x1, int y1) {
         double sum = 0;
