@@ -111,6 +111,7 @@ class LittleServer {
     }
     const Say say = answer_(ask);
     rest(say.after);
+    --at_once_;  // before the reply: who has it may ask for the next before this thread goes on
     if (!say.hangs_up) {
       std::string reply = fmt::format("HTTP/1.1 {} Some\r\nConnection: close\r\nContent-Length: {}\r\n", say.status,
                                       say.claims >= 0 ? static_cast<std::size_t>(say.claims) : say.body.size());
@@ -123,7 +124,6 @@ class LittleServer {
       }
     }
     rest(say.lingers);
-    --at_once_;
     close(talk);
   }
 
