@@ -7,7 +7,8 @@
 namespace tellurion::surface {
 
 /// A lower bound of the displayed heights of all ground in the picture up to where lines of sight meet that bound: metres, at most 0 and
-/// at least `frame.lowest`. A line that meets the ellipsoid lowered by it (see Horizon) has met the ground before.
+/// at least `frame.lowest`. A line from above the ground that meets the ellipsoid lowered by it (see Horizon) has
+/// met the ground before; an eye below the ground may be shown less than there is.
 double lowest_in_sight(NodePool& pool, const SelectionFrame& frame);
 
 }  // namespace tellurion::surface
