@@ -6,13 +6,12 @@
 #include <iterator>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <type_traits>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "base/hash.h"
+#include "prepare/write_whole.h"
 
 namespace tellurion::prepare {
 namespace {
@@ -55,17 +54,7 @@ Result<void> save_scan(const surface::PartScan& scan, const fs::path& file) {
   put(bytes, scan.above.data(), scan.above.size());
   const std::uint64_t sum = fnv1a(bytes);
   put(bytes, &sum, 1);
-  fs::path part = file;
-  part += fmt::format(".{}.part", getpid());
-  std::ofstream stream(part, std::ios::binary);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  std::error_code error;
-  if (stream) fs::rename(part, file, error);
-  if (stream && !error) return {};
-  std::error_code ignored;
-  fs::remove(part, ignored);
-  return {ErrorCode::unavailable, fmt::format("{} cannot be written; is the folder writable, and is there room on the disk? The same command goes on from there", file.string())};
+  return write_whole(file, bytes);
 }
 
 Result<surface::PartScan> load_scan(const fs::path& file, const geo::TileKey& root) {

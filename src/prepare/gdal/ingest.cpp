@@ -11,7 +11,6 @@
 
 #include <cpl_conv.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "base/hash.h"
 #include "prepare/chunk_file.h"
@@ -22,6 +21,7 @@
 #include "prepare/gdal/output_errors.h"
 #include "prepare/parallel.h"
 #include "prepare/work_lock.h"
+#include "prepare/write_whole.h"
 #include "source/gdal/gdal_runtime.h"
 #include "source/gdal/gdal_source.h"
 
@@ -34,20 +34,6 @@ constexpr std::size_t kProgramBytes = std::size_t{96} << 20;  ///< of the progra
 constexpr std::size_t kLeastCacheBytes = std::size_t{16} << 20;
 constexpr const char* kPlanFile = "plan.json";
 constexpr const char* kJoinedFile = "joined";
-
-Result<void> write_whole(const fs::path& file, const std::string& text) {
-  fs::path part = file;
-  part += fmt::format(".{}.part", getpid());
-  std::ofstream stream(part, std::ios::binary);
-  stream << text;
-  stream.close();
-  std::error_code error;
-  if (stream) fs::rename(part, file, error);
-  if (stream && !error) return {};
-  std::error_code ignored;
-  fs::remove(part, ignored);
-  return {ErrorCode::unavailable, fmt::format("{} cannot be written; is the folder writable, and is there room on the disk?", file.string())};
-}
 
 std::string read_text(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
