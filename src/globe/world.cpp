@@ -18,6 +18,9 @@
 namespace tellurion::globe {
 namespace {
 
+const std::initializer_list<std::string_view> kLayerKeys{"name",       "group",   "source",  "opacity", "gamma",
+                                                         "multiplier", "feather", "enabled", "mode",    "attribution"};
+
 constexpr std::string_view kGroupNames[] = {"height", "normal", "color", "grayscale", "grayscale-overlay", "water", "night", "overlay"};
 
 /// Sources that need neither file nor server.
@@ -76,8 +79,7 @@ class WorldReader {
   LayerSpec read_layer(const toml::table& table) {
     LayerSpec layer;
     layer.line = line_of(table);
-    expect_keys(table, "[[layer]]",
-                {"name", "group", "source", "opacity", "gamma", "multiplier", "feather", "enabled", "mode", "attribution"});
+    expect_keys(table, "[[layer]]", kLayerKeys);
     const auto group = text(table, "group");
     if (!group) {
       fail(table, "the layer has no `group`");
@@ -386,8 +388,13 @@ class WorldReader {
   void expect_keys(const toml::table& table, std::string_view where, std::initializer_list<std::string_view> known) {
     for (const auto& [key, node] : table) {
       if (std::find(known.begin(), known.end(), key.str()) == known.end())
-        fail(node, fmt::format("{} has no key `{}`; it knows {}", where, key.str(), fmt::join(known, ", ")));
+        fail(node, fmt::format("{} has no key `{}`{}; it knows {}", where, key.str(), is_layers(where, key.str()) ? ", which the [[layer]] has" : "",
+                               fmt::join(known, ", ")));
     }
+  }
+
+  static bool is_layers(std::string_view where, std::string_view key) {
+    return where == "source" && std::find(kLayerKeys.begin(), kLayerKeys.end(), key) != kLayerKeys.end();
   }
 
   static int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }

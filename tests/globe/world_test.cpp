@@ -167,6 +167,7 @@ TEST_CASE("parse_world: tiles of heights may be meshes or heightmaps") {
 TEST_CASE("parse_world: services, each with its own keys") {
   const auto source = [](const std::string& keys) { return message_of("[[layer]]\ngroup = \"color\"\nsource = { " + keys + " }\n"); };
   CHECK(contains(source("type = \"wmts\", url = \"http://h\", layers = \"a\""), "w.toml:3: source has no key `layers`"));
+  CHECK(contains(source("type = \"wmts\", url = \"http://h\", attribution = \"a\""), "source has no key `attribution`, which the [[layer]] has; it knows type, "));
   CHECK(contains(source("type = \"wms\", url = \"http://h\", layer = \"a\""), "no key `layer`"));
   CHECK(contains(source("type = \"tms\", url = \"http://h\", style = \"a\""), "no key `style`"));
   CHECK(contains(source("type = \"wms\", url = \"http://h\", version = \"2.0\""), "1.3.0"));
