@@ -157,7 +157,7 @@ void add_repair_options(CLI::App& command, prepare::RepairOptions& repair) {
   base->type_name("FILE");
   command.add_option_function<double>("--clouds", [&repair](const double& b) { repair.clouds = b; }, "take what all colours show brighter than --fill-from by more than this (30, say) from there too")
       ->check(in_range(1.0, 65535.0))->needs(base)->type_name("BRIGHTER");
-  CLI::Option* coast = command.add_option_function<std::string>("--coast", [&repair](const std::string& t) { repair.coasts.push_back(t); }, "a file of polygons of land (Shapefile, GeoPackage, GeoJSON); may be repeated");
+  CLI::Option* coast = command.add_option_function<std::string>("--coast", [&repair](const std::string& t) { repair.coasts.push_back(t); }, "a file of polygons of land (Shapefile, GeoPackage, GeoJSON) or GMT's GSHHG (binned_GSHHS_*.nc); may be repeated");
   CLI::Option* beyond = command.add_option("--sea-beyond", repair.sea_beyond, "cut away the sea that is farther than this off the coast")->check(in_range(0.0, 2e7));
   coast->needs(beyond)->trigger_on_parse()->type_name("FILE");
   beyond->needs(coast)->type_name("METRES");

@@ -30,6 +30,7 @@ test_packages=(
   doctest-dev libgeographiclib-dev
   python3 python3-gdal python3-numpy
   imagemagick x11-apps xauth xdotool xvfb
+  gmt-gshhg-low                                                # shorelines
   mapproxy nginx-light openssl                                 # services and a server to ask
   munge slurm-client slurmctld slurmd                          # a batch system of one machine
 )

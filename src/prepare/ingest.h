@@ -22,7 +22,7 @@ struct RepairOptions {
   int fill_voids = 0;                      ///< pixels: voids of heights of up to that width and height are filled smoothly; 0: none
   std::optional<std::string> fill_from{};  ///< a raster that covers all; what is missing comes from it, fitted to its surroundings
   std::optional<double> clouds{};          ///< what all colours show brighter than `fill_from` by more than this, in samples, is cloud and comes from there too
-  std::vector<std::string> coasts{};       ///< up to 64 files of polygons of land, off which the sea is cut away beyond `sea_beyond`
+  std::vector<std::string> coasts{};       ///< up to 64 files of land, polygons or GMT's GSHHG, off which the sea is cut away beyond `sea_beyond`
   double sea_beyond = 0.0;                 ///< metres over ground
 
   bool fills() const { return fill_voids > 0 || fill_from; }

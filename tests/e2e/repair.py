@@ -381,6 +381,107 @@ class Sea(RepairCase):
         self.refused(shared(RAINIER), "--sea-beyond", 1000, naming="--coast", status=WRONG_USAGE)
 
 
+class Gshhg(RepairCase):
+    """The land of GSHHG as GMT packs it. Expected is what the segments of the file say one by one: how far the nearest is, and how many lie between a place and the north pole."""
+
+    FOLDER = pathlib.Path("/usr/share/gmt-gshhg")
+    COAST = FOLDER / "binned_GSHHS_l.nc"
+    STEP = 0.04  # degrees between points of the coast: 4.4 km, with which a distance of 100 km is at most (2.2 km)² / 200 km = 25 m too long
+    TOLERANCE = 100  # metres
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        group = gdal.OpenEx(str(cls.COAST), gdal.OF_MULTIDIM_RASTER).GetRootGroup()
+        arrays = [group.OpenMDArray(name).ReadAsArray() for name in (
+            "Bin_size_in_minutes", "Id_of_first_segment_in_a_bin", "N_segments_in_a_bin", "Embedded_npts_levels_exit_entry_for_a_segment",
+            "Id_of_first_point_in_a_segment", "Relative_longitude_from_SW_corner_of_bin", "Relative_latitude_from_SW_corner_of_bin")]
+        side, firsts, counts, about, first_points, east, north = arrays
+        side = side[0] / 60
+        columns = round(360 / side)
+        edges = []
+        for bin_, (first, count) in enumerate(zip(firsts, counts)):
+            for segment in range(first, first + count):
+                if about[segment] >> 6 & 7 != 1:  # level
+                    continue
+                points = slice(first_points[segment], first_points[segment] + (about[segment] >> 9))
+                longitude = side * (bin_ % columns + east[points].astype(np.uint16) / 65535)
+                latitude = 90 - side * (bin_ // columns + 1 - north[points].astype(np.uint16) / 65535)
+                edges.append(np.stack([latitude[:-1], longitude[:-1], latitude[1:], longitude[1:]], axis=1))
+        cls.edges = np.concatenate(edges)
+        steps = np.ceil(np.abs(cls.edges[:, 2:] - cls.edges[:, :2]).max(axis=1) / cls.STEP).astype(int).clip(1)
+        which = np.repeat(np.arange(len(steps)), steps)
+        share = ((np.arange(len(which)) - np.repeat(np.cumsum(steps) - steps, steps)) / steps[which])[:, None]
+        cls.points = on_ellipsoid(*(cls.edges[which, :2] * (1 - share) + cls.edges[which, 2:] * share).T)
+
+    def is_land(self, latitude, longitude):
+        south, west, north, east = self.edges.T
+        across = (west <= longitude % 360) != (east <= longitude % 360)
+        share = (longitude % 360 - west[across]) / (east - west)[across]
+        return np.count_nonzero(south[across] + share * (north - south)[across] > latitude) % 2 == 1
+
+    def check(self, kept, latitude, longitude, metres):
+        """`kept` of pixels at places, which are few."""
+        on_land = np.array([self.is_land(*place) for place in zip(latitude, longitude)])
+        chord = np.array([np.sqrt(((self.points - place) ** 2).sum(axis=1).min()) for place in on_ellipsoid(latitude, longitude)])
+        way = 2 * 6371e3 * np.arcsin(chord / (2 * 6371e3))
+        sure = (np.abs(way - metres) > self.TOLERANCE) | on_land
+        self.assertGreater(sure.mean(), 0.98)
+        for some in (on_land, ~on_land & kept, ~kept):
+            self.assertGreater(some.sum(), 20)
+        np.testing.assert_array_equal(kept[sure], (on_land | (way < metres))[sure])
+        print(f"{sure.sum()} pixels are cut or kept as the file's lines say, {on_land.sum()} of them land")
+
+    def test_pictures_are_cut_as_the_lines_of_the_file_say(self):
+        out, _ = self.ingest(shared(BLUE_MARBLE), "--coast", self.COAST, "--sea-beyond", 100e3, "--compress", "deflate", out="whole.tif")
+        random = np.random.default_rng(7)
+        rows, columns = random.integers(0, 2048, 1000), random.integers(0, 4096, 1000)
+        columns[:60] = [0, 4095, 2047, 2048] * 15  # along 180 and 0 degrees
+        self.check(read(out)[3][rows, columns] == 255, 90 - (rows + 0.5) * 180 / 2048, (columns + 0.5) * 360 / 4096 - 180, 100e3)
+
+    def test_heights_around_the_poles_are_cut_so_too(self):
+        for source in (ARCTIC, "earth/regional/antarctica_etopo5_epsg3031_10km.tif"):
+            with self.subTest(source):
+                heights, _ = self.ingest(shared(source), "--coast", self.COAST, "--sea-beyond", 100e3, out="pole.tif")
+                whole, _ = self.ingest(shared(source), out="whole-pole.tif")
+                raster = gdal.Open(str(heights))
+                data, t, void = raster.ReadAsArray(), raster.GetGeoTransform(), raster.GetRasterBand(1).GetNoDataValue()
+                rows, columns = np.random.default_rng(8).integers(0, min(data.shape), (2, 600))
+                rows[:20], columns[:20] = data.shape[0] // 2 + np.arange(20) // 5 - 2, data.shape[1] // 2 + np.arange(20) % 5 - 2
+                there = read(whole)[rows, columns] != void
+                rows, columns = rows[there], columns[there]
+                crs = osr.SpatialReference()
+                crs.SetFromUserInput("OGC:CRS84")
+                places = np.array(osr.CoordinateTransformation(raster.GetSpatialRef(), crs).TransformPoints(np.stack([t[0] + t[1] * (columns + 0.5), t[3] + t[5] * (rows + 0.5)], axis=1)))
+                self.check(data[rows, columns] != void, places[:, 1], places[:, 0], 100e3)
+
+    def test_land_is_where_it_is_known_to_be_in_every_resolution_and_datum(self):
+        land = {"Sahara": (23, 10), "Amazon": (-5, -60), "Greenland": (75, -40), "Australia": (-25, 135), "the Caspian Sea, a lake": (42, 51), "Lake Superior": (47.7, -87.5), "Ghana": (8, 0.1), "west of Ghana": (8, -0.1),
+                "Chukotka": (67.5, 179.9), "east of Chukotka": (67.5, -179.9), "Antarctica": (-80, 90), "its west": (-80, -120), "Ross Ice Shelf": (-80, 179.9), "east of there": (-80, -179.9), "the south pole": (-89.9, 179.9)}
+        sea = {"Pacific": (0, -150), "at 180 degrees": (-30, 179.9), "east of it": (-30, -179.9), "Gulf of Guinea": (0, 0.1), "west of it": (0, -0.1), "Ross Sea": (-74, 179.9), "east of that": (-74, -179.9), "the north pole": (89.9, 0.1)}
+        small = self.folder / "small.tif"
+        gdal.Translate(str(small), str(shared(BLUE_MARBLE)), width=1800, height=900, outputSRS="EPSG:4326")
+        for resolution, crs in (("c", "EPSG:4326"), ("l", "EPSG:4326"), ("i", "EPSG:4326"), ("i", "EPSG:4301"), ("i", "EPSG:4267")):  # Tokyo lies 460 m off, NAD27 100 m
+            out, _ = self.ingest(small, "--crs", crs, "--coast", self.FOLDER / f"binned_GSHHS_{resolution}.nc", "--sea-beyond", 5000, "--compress", "deflate", out=f"{resolution}-{crs[5:]}.tif")
+            kept = read(out)[3] == 255
+            self.assertEqual(kept.shape, (900, 1800))
+            for places, expected in ((land, True), (sea, False)):
+                for name, (latitude, longitude) in places.items():
+                    with self.subTest(name, resolution=resolution, crs=crs):
+                        self.assertEqual(kept[int((90 - latitude) * 5), int((longitude + 180) * 5)], expected)
+
+    def test_what_is_damaged_or_no_shoreline_is_named(self):
+        data = self.COAST.read_bytes()
+        files = [self.FOLDER / "binned_river_c.nc"]
+        for share in (0.01, 0.5, 0.99):
+            files.append(self.folder / f"{share}.nc")
+            files[-1].write_bytes(data[:int(share * len(data))])
+        for file in files:
+            with self.subTest(str(file)):
+                self.refused(shared(RAINIER), "--coast", file, "--sea-beyond", 1000, naming=file)
+        self.refused(shared("mars/mola_4ppd.tif"), "--coast", self.COAST, "--sea-beyond", 1000, naming=self.COAST)
+
+
 class Clouds(RepairCase):
     """Real clouds, the thicker ones, painted over Blue Marble between 50 degrees south and north; the base is of another month and half as fine."""
 

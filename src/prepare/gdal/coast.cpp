@@ -1,8 +1,11 @@
 #include "prepare/gdal/coast.h"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <numbers>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -10,6 +13,7 @@
 #include <gdal_priv.h>
 #include <ogrsf_frmts.h>
 
+#include "prepare/gdal/gmt_shoreline.h"
 #include "prepare/gdal/input.h"
 #include "source/gdal/gdal_runtime.h"
 
@@ -46,74 +50,109 @@ OGRSpatialReference crs_of(const OutputPlan& plan) {
 /// Reads rings of polygons and turns them to latitude and longitude.
 class RingReader {
  public:
-  RingReader(OGRCoordinateTransformation* transformation, double radians, Land& land) : transformation_(transformation), radians_(radians), land_(land) {}
+  static Result<RingReader> create(const std::string& path, OGRSpatialReference from, const Geographic& to) {
+    RingReader reader;
+    reader.path_ = path;
+    from.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+    const source::QuietErrors quiet;
+    reader.transformation_.reset(OGRCreateCoordinateTransformation(&from, &to.crs));
+    if (!reader.transformation_) return {ErrorCode::unsupported, fmt::format("{}: its coordinate system does not go into the output's: {}", path, quiet.last())};
+    if (from.IsGeographic()) reader.from_radians_ = from.GetAngularUnits();
+    reader.to_radians_ = to.radians;
+    return reader;
+  }
 
-  /// False if a point of it has no place.
-  bool add(const OGRGeometry& geometry) {
+  /// Errors: unsupported, if a point of it has no place.
+  Result<void> add(const OGRGeometry& geometry, Land& land) const {
     const OGRwkbGeometryType type = wkbFlatten(geometry.getGeometryType());
     if (type == wkbPolygon) {
       for (const OGRLinearRing* ring : *geometry.toPolygon()) {
-        if (!add_ring(*ring)) return false;
+        const int count = ring->getNumPoints() - (ring->get_IsClosed() ? 1 : 0);
+        std::vector<double> x, y;
+        for (int i = 0; i < count; ++i) {
+          x.push_back(ring->getX(i));
+          y.push_back(ring->getY(i));
+        }
+        if (Result<void> added = add(std::move(x), std::move(y), land); !added) return added;
       }
     } else if (OGR_GT_IsSubClassOf(type, wkbGeometryCollection)) {
       for (const OGRGeometry* part : *geometry.toGeometryCollection()) {
-        if (!add(*part)) return false;
+        if (Result<void> added = add(*part, land); !added) return added;
       }
     }
-    return true;
+    return {};
+  }
+
+  Result<void> add(std::vector<double> x, std::vector<double> y, Land& land) const {
+    if (x.size() < 3) return {};
+    const std::vector<double> before = x;
+    if (!transformation_->Transform(static_cast<int>(x.size()), x.data(), y.data())) {
+      return {ErrorCode::unsupported, fmt::format("{}: parts of it lie nowhere in the output's coordinate system; bring it to degrees first: ogr2ogr -t_srs EPSG:4326 OUT.gpkg IN", path_)};
+    }
+    Ring& ring = land.emplace_back();
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      double longitude = x[i] * to_radians_;
+      // A change of datum may wrap longitudes; a ring that goes past the 180th meridian shall go on there.
+      if (from_radians_) longitude = *from_radians_ * before[i] + std::remainder(longitude - *from_radians_ * before[i], 2.0 * std::numbers::pi);
+      ring.push_back({Radians(y[i] * to_radians_), Radians(longitude)});
+    }
+    return {};
   }
 
  private:
-  bool add_ring(const OGRLinearRing& ring) {
-    const int count = ring.getNumPoints() - (ring.get_IsClosed() ? 1 : 0);
-    if (count < 3) return true;
-    std::vector<double> x(static_cast<std::size_t>(count)), y(x.size());
-    for (int i = 0; i < count; ++i) {
-      x[static_cast<std::size_t>(i)] = ring.getX(i);
-      y[static_cast<std::size_t>(i)] = ring.getY(i);
-    }
-    if (!transformation_->Transform(count, x.data(), y.data())) return false;
-    Ring& added = land_.emplace_back();
-    for (std::size_t i = 0; i < x.size(); ++i) added.push_back({Radians(y[i] * radians_), Radians(x[i] * radians_)});
-    return true;
-  }
-
-  OGRCoordinateTransformation* transformation_;
-  double radians_;
-  Land& land_;
+  std::string path_;
+  std::unique_ptr<OGRCoordinateTransformation, DestroyTransformation> transformation_;
+  std::optional<double> from_radians_;  ///< of its unit, if that is an angle
+  double to_radians_ = 0.0;
 };
 
 Result<void> add_layer(const std::string& path, OGRLayer& layer, const Geographic& to, Land& land) {
   const source::QuietErrors quiet;
   if (layer.GetSpatialRef() == nullptr) return {ErrorCode::unsupported, fmt::format("{}: says no coordinate system; give it one: ogr2ogr -a_srs EPSG:4326 OUT.gpkg IN", path)};
-  OGRSpatialReference from = *layer.GetSpatialRef();
-  from.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
-  OGRCoordinateTransformation* transformation = OGRCreateCoordinateTransformation(&from, &to.crs);
-  if (transformation == nullptr) return {ErrorCode::unsupported, fmt::format("{}: its coordinate system does not go into the output's: {}", path, quiet.last())};
-  RingReader reader(transformation, to.radians, land);
-  bool good = true;
+  const Result<RingReader> reader = RingReader::create(path, *layer.GetSpatialRef(), to);
+  if (!reader) return reader.error();
   for (const auto& feature : layer) {
     const OGRGeometry* geometry = feature->GetGeometryRef();
-    if (geometry == nullptr || !good) continue;
+    if (geometry == nullptr) continue;
     const std::unique_ptr<OGRGeometry> straight(geometry->getLinearGeometry());
-    good = reader.add(*straight);
+    if (Result<void> added = reader->add(*straight, land); !added) return added;
   }
-  OGRCoordinateTransformation::DestroyCT(transformation);
-  if (!good) return {ErrorCode::unsupported, fmt::format("{}: parts of it lie nowhere in the output's coordinate system; bring it to degrees first: ogr2ogr -t_srs EPSG:4326 OUT.gpkg IN", path)};
+  return {};
+}
+
+Result<void> add_gmt_shoreline(const std::string& path, GDALDataset& dataset, const Geographic& to, Land& land) {
+  const Result<Land> shoreline = read_gmt_shoreline(dataset, path);
+  if (!shoreline) return shoreline.error();
+  const Result<RingReader> reader = RingReader::create(path, OGRSpatialReference(SRS_WKT_WGS84_LAT_LONG), to);
+  if (!reader) return reader.error();
+  for (const Ring& ring : *shoreline) {
+    std::vector<double> x, y;
+    for (const geo::LatLon& place : ring) {
+      x.push_back(to_degrees(place.longitude).value);
+      y.push_back(to_degrees(place.latitude).value);
+    }
+    if (Result<void> added = reader->add(std::move(x), std::move(y), land); !added) return added;
+  }
   return {};
 }
 
 Result<Land> read_land(const std::string& path, const Geographic& to, std::string& revision) {
   const source::QuietErrors quiet;
-  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
-  if (!dataset) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) return {ErrorCode::not_found, fmt::format("{}: is not there", path)};
-    return {ErrorCode::unsupported, fmt::format("{}: is no file of polygons that GDAL opens; a coast is one of land, as Shapefile, GeoPackage or GeoJSON (of GSHHG: GSHHS_shp, level L1)", path)};
-  }
   Land land;
-  for (OGRLayer* layer : dataset->GetLayers()) {
-    if (Result<void> added = add_layer(path, *layer, to, land); !added) return added.error();
+  GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
+  if (dataset) {
+    for (OGRLayer* layer : dataset->GetLayers()) {
+      if (Result<void> added = add_layer(path, *layer, to, land); !added) return added.error();
+    }
+  } else {
+    constexpr std::array<const char*, 2> kDrivers{"netCDF", nullptr};
+    dataset.reset(GDALDataset::Open(path.c_str(), GDAL_OF_MULTIDIM_RASTER | GDAL_OF_READONLY, kDrivers.data()));
+    if (!dataset) {
+      std::error_code error;
+      if (!std::filesystem::exists(path, error)) return {ErrorCode::not_found, fmt::format("{}: is not there", path)};
+      return {ErrorCode::unsupported, fmt::format("{}: is damaged, or no file of polygons that GDAL opens; a coast is one of land, as Shapefile, GeoPackage or GeoJSON, or GSHHG of GMT (Debian: gmt-gshhg-low; binned_GSHHS_l.nc)", path)};
+    }
+    if (Result<void> added = add_gmt_shoreline(path, *dataset, to, land); !added) return added.error();
   }
   if (land.empty()) return {ErrorCode::unsupported, fmt::format("{}: holds no polygons; a coast is a file of polygons of land", path)};
   revision += "|" + revision_of(*dataset, path);

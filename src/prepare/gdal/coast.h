@@ -13,13 +13,17 @@
 
 namespace tellurion::prepare {
 
-/// Land out of files of polygons.
+struct DestroyTransformation {
+  void operator()(OGRCoordinateTransformation* transformation) const { OGRCoordinateTransformation::DestroyCT(transformation); }
+};
+
+/// Land out of files.
 struct Coast {
   std::string revision;  ///< what it depends on
   Shore shore;
 
-  /// All polygons that GDAL finds in `paths`, for rasters in `crs`; a file is a land.
-  /// Errors: not_found, unsupported; both name the file and what to do.
+  /// All polygons that GDAL finds in `paths`, or GSHHG's shorelines as GMT packs them, for rasters in `crs`; a file is a land.
+  /// Errors: not_found, unsupported, corrupt; all name the file and what to do.
   static Result<std::shared_ptr<const Coast>> create(const std::vector<std::string>& paths, const std::string& crs);
 };
 
@@ -32,15 +36,11 @@ class SeaCutter {
   void cut(const PixelBox& box, Samples& samples) const;
 
  private:
-  struct Destroy {
-    void operator()(OGRCoordinateTransformation* transformation) const { OGRCoordinateTransformation::DestroyCT(transformation); }
-  };
-
   std::shared_ptr<const Coast> coast_;
   const OutputPlan* plan_ = nullptr;
   double metres_ = 0.0;
   double radians_ = 0.0;  ///< of a unit of angle
-  std::unique_ptr<OGRCoordinateTransformation, Destroy> to_geographic_;
+  std::unique_ptr<OGRCoordinateTransformation, DestroyTransformation> to_geographic_;
 };
 
 }  // namespace tellurion::prepare
