@@ -19,7 +19,7 @@ Result<void> write_whole(const std::filesystem::path& file, std::string_view con
   if (stream && !error) return {};
   std::error_code ignored;
   std::filesystem::remove(part, ignored);
-  return {ErrorCode::unavailable, fmt::format("{} cannot be written; is the folder writable, and is there room on the disk?", file.string())};
+  return {ErrorCode::unavailable, fmt::format("{} cannot be written; is the folder writable, and is there room on the disk? The same command goes on from there", file.string())};
 }
 
 }  // namespace tellurion::prepare
